@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// From triangles to a tree that rays can walk.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <zkd/config.hpp>
+#include <zkd/cpu/executor.hpp>
+#include <zkd/geometry.hpp>
+#include <zkd/options.hpp>
+#include <zkd/tree.hpp>
+
+namespace zkd {
+
+/// Builds a kd-tree over `triangles` (Li, Wang, Deng: Fully Parallel Kd-Tree Construction for
+/// Real-Time Ray Tracing, I3D 2014).
+///
+/// Blocks until the tree is finished. For given triangles and options the tree has the same bytes
+/// on every backend, instruction set and thread count; for permuted triangles it is the same tree
+/// with ids mapped, up to the order of ids within a leaf. No triangles, or none valid, is a valid
+/// empty tree.
+///
+/// O(n) work for `once` (radix sort on a fixed number of digits) plus O(log n) a leaf; for `all`
+/// O((n + references) * depth).
+///
+/// Throws Error: index_out_of_range, non_finite_vertex, too_many_triangles, too_many_references,
+/// invalid_view, invalid_option, unsupported_option, backend_unavailable, out_of_memory. When it
+/// throws, everything allocated has been returned.
+[[nodiscard]] ZKD_API Tree build(const TriangleView& triangles, const BuildOptions& options = {});
+
+/// The same, on these threads and out of this memory. `options.backend` is not looked at.
+[[nodiscard]] ZKD_API Tree build(const cpu::Executor& executor, const TriangleView& triangles,
+                                 const BuildOptions& options = {});
+
+/// Memory that a build of `triangle_count` triangles takes at most.
+struct MemoryRequirement {
+  std::size_t tree_bytes = 0;       ///< the finished tree, largest possible
+  std::size_t workspace_bytes = 0;  ///< besides, until build returns
+};
+
+/// What build() allocates at most from its memory resource for `triangle_count` triangles, exact
+/// to the byte for the workspace. For References::all the number of references is not known
+/// beforehand: pass a bound (or a guess) in `reference_count`. O(1).
+///
+/// Throws Error invalid_option, unsupported_option, too_many_triangles.
+[[nodiscard]] ZKD_API MemoryRequirement memory_requirement(const cpu::Executor& executor,
+                                                           std::uint64_t triangle_count,
+                                                           const BuildOptions& options = {},
+                                                           std::uint64_t reference_count = 0);
+
+}  // namespace zkd

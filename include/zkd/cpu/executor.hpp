@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where CPU work runs and whose memory it uses.
+#pragma once
+
+#include <memory_resource>
+
+#include <zkd/config.hpp>
+
+namespace zkd::cpu {
+
+/// Which instructions the inner loops use. Every choice gives the same bits.
+enum class InstructionSet {
+  automatic,  ///< the best of those below that the processor has
+  portable,   ///< what the library was compiled for
+  avx2,       ///< AVX2, FMA and BMI2; falls back to portable where the processor lacks them
+};
+
+/// Passed to build(), to queries over spans and to stages. A value: copy it freely. One executor
+/// may be used by several threads at once if its memory resource may.
+struct Executor {
+  /// OpenMP threads of a call; 0: as many as OpenMP would take (OMP_NUM_THREADS, or all cores).
+  int threads = 0;
+
+  /// Everything a call allocates comes from here and nothing from anywhere else; null: the default
+  /// resource (std::pmr::get_default_resource()). It must outlive the trees built with it. All
+  /// calls to it come from the calling thread.
+  std::pmr::memory_resource* memory = nullptr;
+
+  InstructionSet instructions = InstructionSet::automatic;
+};
+
+}  // namespace zkd::cpu

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a build may be asked for. Every default has its reason beside it.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/config.hpp>
+
+namespace zkd {
+
+/// Where a build without an executor runs.
+enum class Backend {
+  automatic,  ///< CUDA where the program links zkd::cuda and a device answers, else the CPU
+  cpu,
+  cuda,
+};
+
+/// In which leaves a triangle is listed.
+enum class References {
+  once,       ///< in the trunk of its centre only; boxes of siblings may overlap. Fastest to build
+  budget,     ///< some triangles split, within BuildOptions::budget (not in this version)
+  all,        ///< in every leaf cell it touches: a strict kd-tree with disjoint cells
+  automatic,  ///< chosen from the scene (not in this version)
+};
+
+/// Which algorithm decides the planes.
+enum class Builder {
+  morton,  ///< all nodes at once from Morton codes (Li, Wang, Deng, I3D 2014)
+  sah,     ///< exact surface-area heuristic (not in this version)
+  wu2011,  ///< Wu, Zhao, Liu 2011 (not in this version)
+};
+
+/// How much time the Morton builder may spend on a better tree.
+enum class Quality {
+  fast,      ///< one sweep
+  balanced,  ///< not in this version
+  high,      ///< not in this version
+};
+
+/// What happens to a triangle with a NaN or infinite coordinate. (An index out of range is always
+/// an error; a triangle of exactly zero area can never be hit, and is always left out and counted.)
+enum class InvalidTriangles {
+  error,  ///< ErrorCode::non_finite_vertex, naming the first
+  skip,   ///< left out of the tree and counted; ids of the others are kept
+};
+
+/// In which order the bits of the axes enter the Morton code.
+enum class AxisOrder {
+  by_extent,  ///< the longest remaining side first: squarer cells
+  cyclic,     ///< x, y, z in turn, as in the poster
+};
+
+/// Options of build(). A value outside its range is ErrorCode::invalid_option.
+struct BuildOptions {
+  Backend backend = Backend::automatic;  ///< ignored where an executor is given
+
+  Builder builder = Builder::morton;
+  Quality quality = Quality::fast;
+
+  /// `once` builds in a third of the time and memory of `all`; `all` has what only a strict
+  /// kd-tree gives: disjoint cells.
+  References references = References::once;
+
+  /// References per triangle that `budget` may use; finite, at least 1.
+  float budget = 1.3F;
+
+  /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
+  /// 1024. 4 was best or near it for build plus trace on all scenes we have. Time of the trunk
+  /// stage grows with it.
+  std::uint32_t leaf_size = 4;
+
+  /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. 32-bit
+  /// codes give trees as good as 63-bit ones up to a million triangles and sort in half the time.
+  /// Fewer may be used: an axis gets no bits below the resolution of its floats.
+  std::uint32_t code_bits = 0;
+
+  /// By extent: Conference needs 22 node visits per ray instead of 30.
+  AxisOrder axis_order = AxisOrder::by_extent;
+
+  /// Codes the triangles of a crowded trunk (one code, more than leaf_size triangles) again, in
+  /// their own box, with 32 more bits. Costs nothing where no trunk is crowded; without it a small
+  /// model in a large scene becomes one leaf.
+  bool recode_crowded = true;
+
+  InvalidTriangles invalid_triangles = InvalidTriangles::error;
+
+  /// Fills Statistics::depth and ::sah_cost: one more pass over the nodes.
+  bool measure_quality = false;
+};
+
+/// The names used on command lines and in JSON: "once", "morton", ... `automatic` is "auto".
+ZKD_API const char* to_string(Backend value) noexcept;
+ZKD_API const char* to_string(References value) noexcept;
+ZKD_API const char* to_string(Builder value) noexcept;
+ZKD_API const char* to_string(Quality value) noexcept;
+ZKD_API const char* to_string(InvalidTriangles value) noexcept;
+ZKD_API const char* to_string(AxisOrder value) noexcept;
+
+}  // namespace zkd

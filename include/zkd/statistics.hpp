@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a build reports about itself.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <zkd/config.hpp>
+
+namespace zkd {
+
+/// The stages of a build, in order. (DESIGN: validate, encode, sort, ... as in the poster.)
+enum class Stage : std::uint8_t {
+  validate,          ///< checks, triangle boxes, scene box, lattice
+  encode,            ///< Morton codes
+  sort,              ///< stable radix sort on the codes
+  recode,            ///< crowded trunks coded again in their own box
+  trunks,            ///< ranges of codes that become leaves
+  essential_nodes,   ///< where neighbouring trunks first differ
+  path_compression,  ///< essential nodes linked directly
+  split_planes,      ///< axis and position of each essential node
+  references,        ///< which triangles each leaf lists
+  tight_boxes,       ///< boxes of what is really inside, from the leaves up
+  count,
+};
+
+/// "validate", "encode", ... Static storage.
+ZKD_API const char* to_string(Stage stage) noexcept;
+
+/// Work that a scene did not need and that was left out without changing any answer.
+enum class Skip : std::uint8_t {
+  radix_passes,  ///< digits equal in every code; amount: passes left out
+  flat_axes,     ///< axes without extent get no bits; amount: axes
+  wide_codes,    ///< few triangles: 32-bit codes instead of 64; amount: bits
+  recoding,      ///< no crowded trunk, no second round; amount: 1
+  compaction,    ///< no triangle left out, ids need no renumbering; amount: 1
+  count,
+};
+
+ZKD_API const char* to_string(Skip skip) noexcept;
+
+/// One line per skip: whether it was taken and how much work it left out.
+struct SkipReport {
+  bool taken = false;
+  std::uint32_t amount = 0;  ///< in the unit named at the enumerator
+};
+
+struct Statistics {
+  std::uint64_t triangles = 0;            ///< as given
+  std::uint64_t skipped_zero_area = 0;    ///< exactly zero area: never hit, not in the tree
+  std::uint64_t skipped_non_finite = 0;   ///< only with InvalidTriangles::skip
+  std::uint32_t code_bits = 0;            ///< as used
+  std::uint64_t crowded_trunks = 0;       ///< codes shared by more than leaf_size triangles
+  std::uint64_t crowded_triangles = 0;    ///< triangles in them
+  std::uint64_t nodes = 0;                ///< inner nodes
+  std::uint64_t leaves = 0;
+  std::uint64_t references = 0;
+  std::uint64_t largest_leaf = 0;         ///< references; with measure_quality, else 0
+
+  /// Edges from the root to the deepest leaf; 0 for a single leaf. With measure_quality, else 0.
+  std::uint32_t depth = 0;
+
+  /// Expected cost of a random long ray: sum of area(box) / area(root box) over inner nodes (times
+  /// 1) and over leaves (times their references), areas of tight boxes (MacDonald and Booth 1990).
+  /// With measure_quality, else 0.
+  double sah_cost = 0.0;
+
+  std::uint64_t tree_bytes = 0;       ///< the finished tree
+  std::uint64_t workspace_bytes = 0;  ///< most that was held besides, freed when build returns
+
+  double total_ms = 0.0;  ///< wall time of the build, allocation included
+  std::array<double, static_cast<std::size_t>(Stage::count)> stage_ms{};
+  std::array<SkipReport, static_cast<std::size_t>(Skip::count)> skips{};
+
+  [[nodiscard]] double ms(Stage stage) const { return stage_ms[static_cast<std::size_t>(stage)]; }
+  [[nodiscard]] const SkipReport& skip(Skip what) const {
+    return skips[static_cast<std::size_t>(what)];
+  }
+};
+
+}  // namespace zkd
