@@ -23,10 +23,10 @@ namespace zkd::stages {
 
 /// What validation found.
 struct SceneSummary {
-  Box bounds;                         ///< of the valid triangles
-  std::uint32_t valid = 0;            ///< triangles that go into the tree
-  std::uint32_t zero_area = 0;        ///< left out: exactly zero area
-  std::uint32_t non_finite = 0;       ///< left out: NaN or infinite coordinate
+  Box bounds;                    ///< of the valid triangles
+  std::uint32_t valid = 0;       ///< triangles that go into the tree
+  std::uint32_t zero_area = 0;   ///< left out: exactly zero area
+  std::uint32_t non_finite = 0;  ///< left out: NaN or infinite coordinate
 };
 
 /// Stage 1, validation and scene box. boxes[i] becomes the box of triangle i, or an empty box if
@@ -72,10 +72,12 @@ struct TrunkKey {
   std::uint64_t code = 0;
   std::uint64_t fine = 0;
 
-  friend ZKD_HOST_DEVICE bool operator<(const TrunkKey& a, const TrunkKey& b) {
+  friend ZKD_HOST_DEVICE
+  bool operator<(const TrunkKey& a, const TrunkKey& b) {
     return a.code != b.code ? a.code < b.code : a.fine < b.fine;
   }
-  friend ZKD_HOST_DEVICE bool operator==(const TrunkKey& a, const TrunkKey& b) {
+  friend ZKD_HOST_DEVICE
+  bool operator==(const TrunkKey& a, const TrunkKey& b) {
     return a.code == b.code && a.fine == b.fine;
   }
 };

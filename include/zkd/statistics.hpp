@@ -47,16 +47,16 @@ struct SkipReport {
 };
 
 struct Statistics {
-  std::uint64_t triangles = 0;            ///< as given
-  std::uint64_t skipped_zero_area = 0;    ///< exactly zero area: never hit, not in the tree
-  std::uint64_t skipped_non_finite = 0;   ///< only with InvalidTriangles::skip
-  std::uint32_t code_bits = 0;            ///< as used
-  std::uint64_t crowded_trunks = 0;       ///< codes shared by more than leaf_size triangles
-  std::uint64_t crowded_triangles = 0;    ///< triangles in them
-  std::uint64_t nodes = 0;                ///< inner nodes
+  std::uint64_t triangles = 0;           ///< as given
+  std::uint64_t skipped_zero_area = 0;   ///< exactly zero area: never hit, not in the tree
+  std::uint64_t skipped_non_finite = 0;  ///< only with InvalidTriangles::skip
+  std::uint32_t code_bits = 0;           ///< as used
+  std::uint64_t crowded_trunks = 0;      ///< codes shared by more than leaf_size triangles
+  std::uint64_t crowded_triangles = 0;   ///< triangles in them
+  std::uint64_t nodes = 0;               ///< inner nodes
   std::uint64_t leaves = 0;
   std::uint64_t references = 0;
-  std::uint64_t largest_leaf = 0;         ///< references; with measure_quality, else 0
+  std::uint64_t largest_leaf = 0;  ///< references; with measure_quality, else 0
 
   /// Edges from the root to the deepest leaf; 0 for a single leaf. With measure_quality, else 0.
   std::uint32_t depth = 0;

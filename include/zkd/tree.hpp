@@ -26,14 +26,18 @@ struct Link {
   static constexpr std::uint32_t leaf_bit = 0x80000000u;
   static constexpr std::uint32_t none = 0xFFFFFFFFu;  ///< the root of an empty tree
 
-  [[nodiscard]] static constexpr ZKD_HOST_DEVICE Link node(std::uint32_t index) { return {index}; }
-  [[nodiscard]] static constexpr ZKD_HOST_DEVICE Link leaf(std::uint32_t index) {
-    return {index | leaf_bit};
-  }
-  [[nodiscard]] constexpr ZKD_HOST_DEVICE bool is_none() const { return bits == none; }
-  [[nodiscard]] constexpr ZKD_HOST_DEVICE bool is_leaf() const { return (bits & leaf_bit) != 0; }
-  [[nodiscard]] constexpr ZKD_HOST_DEVICE std::uint32_t index() const { return bits & ~leaf_bit; }
-  friend constexpr ZKD_HOST_DEVICE bool operator==(Link a, Link b) { return a.bits == b.bits; }
+  [[nodiscard]] static constexpr ZKD_HOST_DEVICE
+  Link node(std::uint32_t index) { return {index}; }
+  [[nodiscard]] static constexpr ZKD_HOST_DEVICE
+  Link leaf(std::uint32_t index) { return {index | leaf_bit}; }
+  [[nodiscard]] constexpr ZKD_HOST_DEVICE
+  bool is_none() const { return bits == none; }
+  [[nodiscard]] constexpr ZKD_HOST_DEVICE
+  bool is_leaf() const { return (bits & leaf_bit) != 0; }
+  [[nodiscard]] constexpr ZKD_HOST_DEVICE
+  std::uint32_t index() const { return bits & ~leaf_bit; }
+  friend constexpr ZKD_HOST_DEVICE
+  bool operator==(Link a, Link b) { return a.bits == b.bits; }
 };
 
 /// An inner node: an essential node of the poster, one cache line.
@@ -54,22 +58,20 @@ struct alignas(64) Node {
   float plane;
   std::uint32_t axis;
 
-  [[nodiscard]] ZKD_HOST_DEVICE float lo(int which, int along) const {
-    return bounds[along][which];
-  }
-  [[nodiscard]] ZKD_HOST_DEVICE float hi(int which, int along) const {
-    return bounds[along][2 + which];
-  }
+  [[nodiscard]] ZKD_HOST_DEVICE
+  float lo(int which, int along) const { return bounds[along][which]; }
+  [[nodiscard]] ZKD_HOST_DEVICE
+  float hi(int which, int along) const { return bounds[along][2 + which]; }
 };
 static_assert(sizeof(Node) == 64);
 
 /// A non-owning view of a finished tree: plain, to be passed to functions and kernels by value.
 /// Valid as long as its owner. Arrays lie where the tree was built, on the host or the device.
 struct TreeView {
-  const Node* nodes = nullptr;                 ///< leaf_count - 1 of them (none for an empty tree)
-  const std::uint32_t* leaf_offsets = nullptr; ///< leaf_count + 1; leaf i lists references
-                                               ///< [leaf_offsets[i], leaf_offsets[i + 1])
-  const std::uint32_t* references = nullptr;   ///< triangle ids
+  const Node* nodes = nullptr;                  ///< leaf_count - 1 of them (none for an empty tree)
+  const std::uint32_t* leaf_offsets = nullptr;  ///< leaf_count + 1; leaf i lists references
+                                                ///< [leaf_offsets[i], leaf_offsets[i + 1])
+  const std::uint32_t* references = nullptr;    ///< triangle ids
   std::uint32_t leaf_count = 0;
   std::uint32_t reference_count = 0;
   Link root;   ///< a node; a leaf if there is only one; none if the tree is empty
@@ -81,13 +83,14 @@ struct TreeView {
   /// lose digits.
   float scale = 1.0F;
 
-  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t node_count() const {
-    return leaf_count > 1 ? leaf_count - 1 : 0;
-  }
-  [[nodiscard]] ZKD_HOST_DEVICE bool empty() const { return leaf_count == 0; }
+  [[nodiscard]] ZKD_HOST_DEVICE
+  std::uint32_t node_count() const { return leaf_count > 1 ? leaf_count - 1 : 0; }
+  [[nodiscard]] ZKD_HOST_DEVICE
+  bool empty() const { return leaf_count == 0; }
 };
 
-/// Owns a finished tree in host memory, one block from the memory resource it was built with.
+/// Owns a finished tree in host memory: two blocks (nodes with leaf offsets, references) from the
+/// memory resource it was built with.
 /// Movable, not copyable by accident: see clone(). Reading one tree from several threads is safe.
 class ZKD_API Tree {
  public:
@@ -127,13 +130,19 @@ class ZKD_API Tree {
   [[nodiscard]] const Statistics& statistics() const noexcept { return statistics_; }
 
  private:
-  friend struct TreeAccess;
+  friend struct TreeAssembler;
+  struct Block {
+    void* data = nullptr;
+    std::size_t bytes = 0;
+  };
+  void swap(Tree& other) noexcept;
+
   TreeView view_;
   Lattice lattice_;
   BuildOptions options_;
   Statistics statistics_;
-  void* block_ = nullptr;
-  std::size_t block_bytes_ = 0;
+  Block node_block_;
+  Block reference_block_;
   std::pmr::memory_resource* memory_ = nullptr;
 };
 

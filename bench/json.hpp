@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Results for scripts: JSON of a versioned schema.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "results.hpp"
+
+namespace zkd::bench {
+
+/// The whole document, schema 1, indented, with a line end. What is unknown is null.
+[[nodiscard]] std::string to_json(const Machine& machine, const std::vector<Result>& results);
+
+}  // namespace zkd::bench

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The command line of zkd-bench: every option, its reading and its help.
+#include "options.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <initializer_list>
+#include <span>
+#include <string_view>
+
+#include <zkd/config.hpp>
+
+namespace zkd::bench {
+namespace {
+
+constexpr std::array all_backends{Backend::automatic, Backend::cpu, Backend::cuda};
+constexpr std::array all_references{References::once, References::budget, References::all,
+                                    References::automatic};
+constexpr std::array all_builders{Builder::morton, Builder::sah, Builder::wu2011};
+constexpr std::array all_qualities{Quality::fast, Quality::balanced, Quality::high};
+constexpr std::array all_axis_orders{AxisOrder::by_extent, AxisOrder::cyclic};
+constexpr std::array all_invalid{InvalidTriangles::error, InvalidTriangles::skip};
+constexpr std::array all_ray_kinds{RayKind::primary, RayKind::diffuse, RayKind::shadow};
+constexpr std::array all_instructions{cpu::InstructionSet::automatic, cpu::InstructionSet::portable,
+                                      cpu::InstructionSet::avx2};
+constexpr std::array all_peers{PeerLibrary::embree};
+
+template <class Enum, std::size_t N>
+std::string names_of(const std::array<Enum, N>& values, const char* separator) {
+  using bench::to_string;
+  using zkd::to_string;
+  std::string names;
+  for (const Enum value : values) {
+    if (!names.empty()) names += separator;
+    names += to_string(value);
+  }
+  return names;
+}
+
+template <class Enum, std::size_t N>
+Enum value_named(const std::array<Enum, N>& values, const std::string& option,
+                 std::string_view name) {
+  using bench::to_string;
+  using zkd::to_string;
+  for (const Enum value : values) {
+    if (name == to_string(value)) return value;
+  }
+  throw UsageError(option + ": '" + std::string(name) + "' is not one of " +
+                   names_of(values, ", "));
+}
+
+// A comma-separated list without repetitions.
+template <class Enum, std::size_t N>
+std::vector<Enum> values_listed(const std::array<Enum, N>& values, const std::string& option,
+                                std::string_view list) {
+  std::vector<Enum> found;
+  for (;;) {
+    const std::size_t comma = list.find(',');
+    const Enum value = value_named(values, option, list.substr(0, comma));
+    if (std::find(found.begin(), found.end(), value) == found.end()) found.push_back(value);
+    if (comma == std::string_view::npos) return found;
+    list.remove_prefix(comma + 1);
+  }
+}
+
+bool on_or_off(const std::string& option, const std::string& value) {
+  if (value == "on") return true;
+  if (value == "off") return false;
+  throw UsageError(option + ": '" + value + "' is not one of on, off");
+}
+
+// CLI11 says some things on several lines; scripts want one.
+std::string one_line(std::string text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+// What distinguishes a setting: its values on the options that were given more than one.
+std::string label_of(const BuildOptions& setting, bool builders, bool qualities, bool references) {
+  std::string label;
+  const auto add = [&](bool varies, const char* name) {
+    if (!varies) return;
+    if (!label.empty()) label += ' ';
+    label += name;
+  };
+  add(builders, zkd::to_string(setting.builder));
+  add(qualities, zkd::to_string(setting.quality));
+  add(references, zkd::to_string(setting.references));
+  return label;
+}
+
+}  // namespace
+
+const char* to_string(PeerLibrary) noexcept { return "embree"; }
+
+const char* to_string(cpu::InstructionSet value) noexcept {
+  switch (value) {
+    case cpu::InstructionSet::automatic:
+      return "auto";
+    case cpu::InstructionSet::portable:
+      return "portable";
+    case cpu::InstructionSet::avx2:
+      return "avx2";
+  }
+  return "auto";
+}
+
+std::optional<Options> parse_options(int argc, const char* const* argv) {
+  const BuildOptions defaults;
+  Options options;
+
+  std::string backend = zkd::to_string(defaults.backend);
+  std::string builder = zkd::to_string(defaults.builder);
+  std::string quality = zkd::to_string(defaults.quality);
+  std::string references = zkd::to_string(defaults.references);
+  std::string axis_order = zkd::to_string(defaults.axis_order);
+  std::string invalid = zkd::to_string(defaults.invalid_triangles);
+  std::string recode = defaults.recode_crowded ? "on" : "off";
+  std::string measure_quality = "on";
+  std::string instructions = bench::to_string(options.instructions);
+  std::string rays = names_of(all_ray_kinds, ",");
+  std::string peers;
+  double budget = static_cast<double>(defaults.budget);
+  std::int64_t threads = 0;
+  std::int64_t leaf_size = defaults.leaf_size;
+  std::int64_t code_bits = defaults.code_bits;
+  std::int64_t size = options.size;
+  std::int64_t repeat = options.repeat;
+  std::int64_t check = 0;
+  std::int64_t seed = 1;
+  std::string json;
+  std::string images;
+
+  CLI::App app(
+      "Builds kd-trees, traces rays through them and says how long it took.\n"
+      "Without a SCENE: the paper's table over every paper scene that is found.",
+      "zkd-bench");
+  app.get_formatter()->column_width(34);
+  app.set_version_flag("--version", "zkd-bench " ZKD_VERSION, "Print the version and exit");
+
+  app.add_option("SCENE", options.scenes,
+                 "Mesh files (.obj .ply .gltf .glb .stl) or names (--list)");
+  app.add_flag("--list", options.list, "List the scenes found on this machine and exit");
+
+  const auto text = [&](const char* group, const char* name, std::string& value,
+                        const std::string& help, const char* type) {
+    app.add_option(name, value, help)->group(group)->type_name(type)->capture_default_str();
+  };
+  const auto number = [&](const char* group, const char* name, std::int64_t& value,
+                          const std::string& help, std::int64_t lowest, std::int64_t highest) {
+    app.add_option(name, value, help)
+        ->group(group)
+        ->type_name("N")
+        ->capture_default_str()
+        ->check([lowest, highest](const std::string& given) {
+          std::int64_t read = 0;
+          if (CLI::detail::lexical_cast(given, read) && read >= lowest && read <= highest) {
+            return std::string();
+          }
+          return "'" + given + "' is not a whole number from " + std::to_string(lowest) + " to " +
+                 std::to_string(highest);
+        });
+  };
+
+  const char* build = "Build";
+  text(build, "--backend", backend, "Where to build: " + names_of(all_backends, ", "), "WHERE");
+  number(build, "--threads", threads, "CPU threads; 0: all", 0, 4096);
+  text(build, "--builder", builder, "List of " + names_of(all_builders, ", "), "LIST");
+  text(build, "--quality", quality, "List of " + names_of(all_qualities, ", "), "LIST");
+  text(build, "--references", references, "List of " + names_of(all_references, ", "), "LIST");
+  app.add_option("--budget", budget, "References per triangle at most, for `budget`")
+      ->group(build)
+      ->type_name("F")
+      ->capture_default_str();
+  number(build, "--leaf-size", leaf_size, "Triangles in a leaf at most", 1, 1024);
+  number(build, "--code-bits", code_bits, "Bits of a Morton code; 0: by triangle count", 0, 64);
+  text(build, "--axis-order", axis_order,
+       "Order of the axes in a code: " + names_of(all_axis_orders, ", "), "ORDER");
+  text(build, "--recode", recode, "Code crowded trunks again: on, off", "ON|OFF");
+  text(build, "--invalid", invalid, "NaN and infinite vertices: " + names_of(all_invalid, ", "),
+       "WHAT");
+  text(build, "--measure-quality", measure_quality,
+       "Depth and SAH cost, in a build of its own: on, off", "ON|OFF");
+  text(build, "--instructions", instructions, names_of(all_instructions, ", "), "SET");
+
+  const char* measure = "Measure";
+  text(measure, "--rays", rays, "List of " + names_of(all_ray_kinds, ", "), "LIST");
+  number(measure, "--size", size, "N x N primary rays", 1, 16384);
+  number(measure, "--seed", seed, "Of bounces and light samples", 0,
+         std::int64_t{0x7FFFFFFFFFFFFFFF});
+  number(measure, "--repeat", repeat, "Interleaved repetitions", 1, 100000);
+  app.add_option("--peers", peers, "Others to time in the same run: " + names_of(all_peers, ", "))
+      ->group(measure)
+      ->type_name("LIST");
+  number(measure, "--check", check, "Rays of each kind against the exact oracle; 0: none", 0,
+         20000000);
+
+  const char* report = "Report";
+  app.add_option("--json", json, "Write results; `-`: standard output, and no table")
+      ->group(report)
+      ->type_name("FILE");
+  app.add_option("--images", images, "Write PNG: shaded, depth, node visits")
+      ->group(report)
+      ->type_name("DIR");
+  app.footer(
+      "Exit status: 0 done; 1 a check failed; 2 bad input or usage; 3 device or memory failure.");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& done) {
+    app.exit(done);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(one_line(error.what()));
+  }
+
+  if (!std::isfinite(budget) || budget < 1.0) {
+    throw UsageError("--budget: '" + std::to_string(budget) + "' is not a number of at least 1");
+  }
+
+  BuildOptions base;
+  base.backend = value_named(all_backends, "--backend", backend);
+  base.budget = static_cast<float>(budget);
+  base.leaf_size = static_cast<std::uint32_t>(leaf_size);
+  base.code_bits = static_cast<std::uint32_t>(code_bits);
+  base.axis_order = value_named(all_axis_orders, "--axis-order", axis_order);
+  base.recode_crowded = on_or_off("--recode", recode);
+  base.invalid_triangles = value_named(all_invalid, "--invalid", invalid);
+
+  const auto builders = values_listed(all_builders, "--builder", builder);
+  const auto qualities = values_listed(all_qualities, "--quality", quality);
+  const auto policies = values_listed(all_references, "--references", references);
+  for (const Builder one_builder : builders) {
+    for (const Quality one_quality : qualities) {
+      for (const References one_policy : policies) {
+        BuildOptions setting = base;
+        setting.builder = one_builder;
+        setting.quality = one_quality;
+        setting.references = one_policy;
+        options.settings.push_back(setting);
+        options.labels.push_back(
+            label_of(setting, builders.size() > 1, qualities.size() > 1, policies.size() > 1));
+      }
+    }
+  }
+
+  options.threads = static_cast<int>(threads);
+  options.instructions = value_named(all_instructions, "--instructions", instructions);
+  options.measure_quality = on_or_off("--measure-quality", measure_quality);
+  options.rays = values_listed(all_ray_kinds, "--rays", rays);
+  std::sort(options.rays.begin(), options.rays.end());
+  options.size = static_cast<unsigned>(size);
+  options.seed = static_cast<std::uint64_t>(seed);
+  options.repeat = static_cast<unsigned>(repeat);
+  options.check = static_cast<std::uint64_t>(check);
+  if (app.count("--peers") > 0) options.peers = values_listed(all_peers, "--peers", peers);
+  if (app.count("--json") > 0) options.json = json;
+  if (app.count("--images") > 0) options.images = images;
+  return options;
+}
+
+}  // namespace zkd::bench

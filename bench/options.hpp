@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The command line of zkd-bench, parsed and checked.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <zkd/cpu/executor.hpp>
+#include <zkd/options.hpp>
+
+#include "results.hpp"
+
+namespace zkd::bench {
+
+/// A command line that makes no sense. One line that names the option.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Other libraries that can be timed in the same run.
+enum class PeerLibrary { embree };
+
+/// "embree". Static storage.
+[[nodiscard]] const char* to_string(PeerLibrary value) noexcept;
+
+struct Options {
+  std::vector<std::string> scenes;  ///< names or files; empty: the scenes of the paper
+
+  std::vector<BuildOptions> settings;  ///< every combination of the lists given; at least one
+  std::vector<std::string> labels;     ///< for each setting, what tells it from the others
+
+  int threads = 0;  ///< 0: all
+  cpu::InstructionSet instructions = cpu::InstructionSet::automatic;
+  bool measure_quality = true;
+
+  std::vector<RayKind> rays;
+  unsigned size = 1024;
+  std::uint64_t seed = 1;
+  unsigned repeat = 5;
+
+  std::vector<PeerLibrary> peers;
+  std::uint64_t check = 0;  ///< rays of each kind; 0: no check
+
+  std::optional<std::filesystem::path> json;  ///< "-": standard output, and no table
+  std::optional<std::filesystem::path> images;
+  bool list = false;
+};
+
+/// "auto", "portable" or "avx2". Static storage.
+[[nodiscard]] const char* to_string(cpu::InstructionSet value) noexcept;
+
+/// Reads the command line. --help and --version print to standard output and return nothing: the
+/// program is done.
+///
+/// Throws UsageError.
+[[nodiscard]] std::optional<Options> parse_options(int argc, const char* const* argv);
+
+}  // namespace zkd::bench

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+#
+# What zkd takes from other packages. The library cannot do without glm and OpenMP; a tool whose
+# package is missing is left out with a line that names the Debian package.
+
+# find_package(package ...), or an error that says what to install.
+macro(zkd_require package debian)
+  find_package(${package} QUIET ${ARGN})
+  if(NOT ${package}_FOUND)
+    message(FATAL_ERROR "zkd needs ${package}, which was not found (Debian and Ubuntu: ${debian}).")
+  endif()
+endmacro()
+
+# find_package(package ...) for a tool. Sets zkd_has_<package> and remembers the Debian name.
+macro(zkd_look_for package debian)
+  find_package(${package} QUIET ${ARGN})
+  set(zkd_has_${package} ${${package}_FOUND})
+  set(zkd_debian_${package} ${debian})
+endmacro()
+
+# The same by pkg-config, target PkgConfig::<package>: for libraries that have no CMake package, and
+# for those whose CMake package stops CMake on Debian where packages that it names but zkd does not
+# use (Draco, command-line tools) are not installed.
+macro(zkd_look_for_module package module debian)
+  find_package(PkgConfig QUIET)
+  set(zkd_has_${package} FALSE)
+  set(zkd_debian_${package} "${debian} and pkg-config")
+  if(PKG_CONFIG_FOUND AND NOT CMAKE_DISABLE_FIND_PACKAGE_${package})
+    pkg_check_modules(${package} QUIET IMPORTED_TARGET GLOBAL ${module})
+    set(zkd_has_${package} ${${package}_FOUND})
+  endif()
+endmacro()
+
+# add_subdirectory(directory) if everything it NEEDS (packages looked for above, or targets) is
+# there; otherwise one line that says why not. Its targets become targets of ours (targets.cmake).
+function(zkd_add_directory directory)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "NEEDS")
+  if(NOT EXISTS "${PROJECT_SOURCE_DIR}/${directory}/CMakeLists.txt")
+    return()
+  endif()
+  # TEMPORARY: while files are being written
+  file(STRINGS "${PROJECT_SOURCE_DIR}/${directory}/CMakeLists.txt" listed REGEX "^ *[a-z_0-9]+[.]cpp")
+  foreach(line IN LISTS listed)
+    string(REGEX MATCHALL "[a-z_0-9]+[.]cpp" names "${line}")
+    foreach(name IN LISTS names)
+      if(NOT EXISTS "${PROJECT_SOURCE_DIR}/${directory}/${name}")
+        message(NOTICE "zkd: ${directory} is left out: ${name} is not written yet")
+        return()
+      endif()
+    endforeach()
+  endforeach()
+  # END TEMPORARY
+  set(reasons "")
+  foreach(need IN LISTS arg_NEEDS)
+    if(NOT TARGET ${need} AND NOT zkd_has_${need})
+      if(DEFINED zkd_debian_${need})
+        list(APPEND reasons "${need} (Debian and Ubuntu: ${zkd_debian_${need}})")
+      else()
+        list(APPEND reasons "${need}")
+      endif()
+    endif()
+  endforeach()
+  if(reasons)
+    list(JOIN reasons ", " reasons)
+    message(NOTICE "zkd: ${directory} is left out; not found: ${reasons}")
+    return()
+  endif()
+  add_subdirectory("${PROJECT_SOURCE_DIR}/${directory}" "${PROJECT_BINARY_DIR}/${directory}")
+  get_property(targets DIRECTORY "${PROJECT_SOURCE_DIR}/${directory}" PROPERTY BUILDSYSTEM_TARGETS)
+  foreach(target IN LISTS targets)
+    get_target_property(type ${target} TYPE)
+    if(NOT type STREQUAL "UTILITY")
+      zkd_own_target(${target})
+    endif()
+  endforeach()
+endfunction()

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Arithmetic that gives the same bits wherever it is compiled.
+//
+// A compiler may fuse a product and a sum into one rounding ("contraction"): nvcc does by default,
+// gcc and clang under -ffp-contract=fast. The library's own host code is compiled without it, but
+// traversal is also compiled into users' kernels, with their flags. Rounded<T> therefore spells out
+// every operation: on the device by the intrinsics that are never fused, on the host by plain
+// operators under the library's flags. fma() is the only fused operation, and explicit.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include <zkd/config.hpp>
+
+namespace zkd::core {
+
+template <class T>
+struct Rounded;
+
+template <>
+struct Rounded<float> {
+  float value = 0.0F;
+
+  Rounded() = default;
+  ZKD_HOST_DEVICE
+  constexpr Rounded(float x) : value(x) {}
+
+#if defined(__CUDA_ARCH__)
+  friend __device__ Rounded operator+(Rounded a, Rounded b) { return __fadd_rn(a.value, b.value); }
+  friend __device__ Rounded operator-(Rounded a, Rounded b) { return __fsub_rn(a.value, b.value); }
+  friend __device__ Rounded operator*(Rounded a, Rounded b) { return __fmul_rn(a.value, b.value); }
+  friend __device__ Rounded operator/(Rounded a, Rounded b) { return __fdiv_rn(a.value, b.value); }
+  friend __device__ Rounded fma(Rounded a, Rounded b, Rounded c) {
+    return __fmaf_rn(a.value, b.value, c.value);
+  }
+#else
+  friend ZKD_HOST_DEVICE
+  Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
+  friend ZKD_HOST_DEVICE
+  Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
+  friend ZKD_HOST_DEVICE
+  Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
+  friend ZKD_HOST_DEVICE
+  Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
+  friend ZKD_HOST_DEVICE
+  Rounded fma(Rounded a, Rounded b, Rounded c) { return __builtin_fmaf(a.value, b.value, c.value); }
+#endif
+  friend ZKD_HOST_DEVICE
+  Rounded operator-(Rounded a) { return -a.value; }
+  friend ZKD_HOST_DEVICE
+  bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
+  friend ZKD_HOST_DEVICE
+  bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
+  friend ZKD_HOST_DEVICE
+  bool operator<=(Rounded a, Rounded b) { return a.value <= b.value; }
+  friend ZKD_HOST_DEVICE
+  bool operator>=(Rounded a, Rounded b) { return a.value >= b.value; }
+  friend ZKD_HOST_DEVICE
+  bool operator==(Rounded a, Rounded b) { return a.value == b.value; }
+};
+
+template <>
+struct Rounded<double> {
+  double value = 0.0;
+
+  Rounded() = default;
+  ZKD_HOST_DEVICE
+  constexpr Rounded(double x) : value(x) {}
+
+#if defined(__CUDA_ARCH__)
+  friend __device__ Rounded operator+(Rounded a, Rounded b) { return __dadd_rn(a.value, b.value); }
+  friend __device__ Rounded operator-(Rounded a, Rounded b) { return __dsub_rn(a.value, b.value); }
+  friend __device__ Rounded operator*(Rounded a, Rounded b) { return __dmul_rn(a.value, b.value); }
+  friend __device__ Rounded operator/(Rounded a, Rounded b) { return __ddiv_rn(a.value, b.value); }
+#else
+  friend ZKD_HOST_DEVICE
+  Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
+  friend ZKD_HOST_DEVICE
+  Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
+  friend ZKD_HOST_DEVICE
+  Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
+  friend ZKD_HOST_DEVICE
+  Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
+#endif
+  friend ZKD_HOST_DEVICE
+  Rounded operator-(Rounded a) { return -a.value; }
+  friend ZKD_HOST_DEVICE
+  bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
+  friend ZKD_HOST_DEVICE
+  bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
+};
+
+using Real = Rounded<float>;
+using Wide = Rounded<double>;
+
+/// a * b - c * d with an error below 1.5 ulp and, short of underflow, the exact sign (Kahan;
+/// Jeannerod, Louvet, Muller: Further analysis of Kahan's algorithm, 2013).
+ZKD_HOST_DEVICE
+inline Real difference_of_products(Real a, Real b, Real c, Real d) {
+  const Real cd = c * d;
+  const Real rounding = fma(-c, d, cd);
+  return fma(a, b, -cd) + rounding;
+}
+
+template <class T>
+ZKD_HOST_DEVICE
+constexpr T smaller(T a, T b) { return b < a ? b : a; }
+template <class T>
+ZKD_HOST_DEVICE
+constexpr T larger(T a, T b) { return a < b ? b : a; }
+
+ZKD_HOST_DEVICE
+inline float magnitude(float x) { return __builtin_fabsf(x); }
+ZKD_HOST_DEVICE
+inline double magnitude(double x) { return __builtin_fabs(x); }
+
+ZKD_HOST_DEVICE
+inline std::uint32_t bits_of(float x) {
+#if defined(__CUDA_ARCH__)
+  return __float_as_uint(x);
+#else
+  return std::bit_cast<std::uint32_t>(x);
+#endif
+}
+
+ZKD_HOST_DEVICE
+inline bool is_finite(float x) { return (bits_of(x) & 0x7F800000u) != 0x7F800000u; }
+
+/// Zeros in front of the first set bit; 64 for 0.
+ZKD_HOST_DEVICE
+inline std::uint32_t leading_zeros(std::uint64_t x) {
+#if defined(__CUDA_ARCH__)
+  return static_cast<std::uint32_t>(__clzll(static_cast<long long>(x)));
+#else
+  return static_cast<std::uint32_t>(std::countl_zero(x));
+#endif
+}
+
+/// 2^exponent, for -1022 <= exponent <= 1023.
+ZKD_HOST_DEVICE
+inline double power_of_two(int exponent) {
+  const auto bits = static_cast<std::uint64_t>(exponent + 1023) << 52;
+#if defined(__CUDA_ARCH__)
+  return __longlong_as_double(static_cast<long long>(bits));
+#else
+  return std::bit_cast<double>(bits);
+#endif
+}
+
+/// floor(log2(|x|)) of a finite x that is not 0 and whose magnitude is at least 2^-1022 (every
+/// float is).
+ZKD_HOST_DEVICE
+inline int exponent_of(double x) {
+#if defined(__CUDA_ARCH__)
+  const auto bits = static_cast<std::uint64_t>(__double_as_longlong(x));
+#else
+  const auto bits = std::bit_cast<std::uint64_t>(x);
+#endif
+  return static_cast<int>((bits >> 52) & 0x7FF) - 1023;
+}
+
+/// floor(x) as an integer, for |x| < 2^31. (std::floor is a library call on portable x86-64.)
+ZKD_HOST_DEVICE
+inline std::int32_t floor_to_int(double x) {
+  const auto truncated = static_cast<std::int32_t>(x);
+  return truncated - (x < static_cast<double>(truncated) ? 1 : 0);
+}
+
+}  // namespace zkd::core

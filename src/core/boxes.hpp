@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Stage 11, tight boxes: what is really inside each child, from the leaves up. The last child to
+// arrive at a node goes on (Karras 2012; Apetrei 2014).
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/tree.hpp>
+
+#include "core/arithmetic.hpp"
+#include "core/compress.hpp"
+#include "core/lattice.hpp"
+#include "core/validate.hpp"
+
+namespace zkd::core {
+
+/// Cuts the cell of a leaf out of the scene box: on each of its six sides the first plane met on
+/// the way up.
+ZKD_HOST_DEVICE
+inline Box leaf_cell(const Node* nodes, const Parent* parents_of_nodes, Parent parent,
+                     const Box& bounds) {
+  Box cell = bounds;
+  std::uint32_t open_sides = 0x3F;
+  while (!parent.is_none() && open_sides != 0) {
+    const Node& node = nodes[parent.node()];
+    const std::uint32_t lower = parent.side();
+    const std::uint32_t bit = 1u << (2 * node.axis + lower);
+    if ((open_sides & bit) != 0) {
+      open_sides &= ~bit;
+      if (lower != 0)
+        cell.lo[node.axis] = node.plane;
+      else
+        cell.hi[node.axis] = node.plane;
+    }
+    parent = parents_of_nodes[parent.node()];
+  }
+  return cell;
+}
+
+/// What `climb` does at a leaf and at each node it is the last to reach. Both write the box they
+/// made into the parent and return it.
+struct TightBoxes {
+  const Box* boxes;  ///< of triangles, in the caller's units
+  const std::uint32_t* leaf_offsets;
+  const std::uint32_t* references;
+  const Parent* parents_of_nodes;
+  const Parent* parents_of_leaves;
+  const SceneFrame* frame;
+  bool clip;  ///< `all`: a leaf's box is what lies in its cell
+  Node* nodes;
+
+  ZKD_HOST_DEVICE
+  Parent leave(Parent parent, const Box& box) const {
+    if (!parent.is_none()) {
+      Node& node = nodes[parent.node()];
+      for (int a = 0; a < 3; ++a) {
+        node.bounds[a][parent.side()] = box.lo[a];
+        node.bounds[a][2 + parent.side()] = box.hi[a];
+      }
+    }
+    return parent;
+  }
+
+  ZKD_HOST_DEVICE
+  Parent begin(std::uint32_t leaf) const {
+    const Parent parent = parents_of_leaves[leaf];
+    Box cell;
+    if (clip) cell = leaf_cell(nodes, parents_of_nodes, parent, frame->bounds);
+    const float scale = static_cast<float>(frame->scale);
+    Box box;
+    for (std::uint32_t r = leaf_offsets[leaf]; r < leaf_offsets[leaf + 1]; ++r) {
+      const Box& triangle = boxes[references[r]];
+      Box inside;
+      for (int a = 0; a < 3; ++a) {
+        inside.lo[a] = triangle.lo[a] * scale;
+        inside.hi[a] = triangle.hi[a] * scale;
+        if (clip) {
+          inside.lo[a] = larger(inside.lo[a], cell.lo[a]);
+          inside.hi[a] = smaller(inside.hi[a], cell.hi[a]);
+        }
+      }
+      include(box, inside);
+    }
+    return leave(parent, box);
+  }
+
+  ZKD_HOST_DEVICE
+  Parent rise(std::uint32_t index) const {
+    const Node& node = nodes[index];
+    Box box;
+    for (int a = 0; a < 3; ++a) {
+      box.lo[a] = smaller(node.bounds[a][0], node.bounds[a][1]);
+      box.hi[a] = larger(node.bounds[a][2], node.bounds[a][3]);
+    }
+    return leave(parents_of_nodes[index], box);
+  }
+};
+
+}  // namespace zkd::core

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Stage 8, path compression: every essential node and trunk is linked directly to the essential
+// node above it; the redundant nodes between are never made.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/tree.hpp>
+
+#include "core/key.hpp"
+#include "core/search.hpp"
+
+namespace zkd::core {
+
+/// The way up from a node or leaf: which node, and as which of its children.
+struct Parent {
+  std::uint32_t bits = 0xFFFFFFFFu;  ///< node * 2 + side; all ones: none
+
+  [[nodiscard]] ZKD_HOST_DEVICE
+  bool is_none() const { return bits == 0xFFFFFFFFu; }
+  [[nodiscard]] ZKD_HOST_DEVICE
+  std::uint32_t node() const { return bits >> 1; }
+  [[nodiscard]] ZKD_HOST_DEVICE
+  std::uint32_t side() const { return bits & 1u; }
+};
+
+/// Where links go: children of node j to links[stride * j] and the next, ways up to two arrays.
+struct LinkWriter {
+  Link* links;
+  std::size_t stride;         ///< in links: 2, or what a node has
+  Parent* parents_of_nodes;   ///< may be null
+  Parent* parents_of_leaves;  ///< may be null
+  Link* root;
+  const std::uint32_t* trunk_count;
+  std::uint32_t trunks = 0;
+
+  ZKD_HOST_DEVICE
+  void load() { trunks = *trunk_count; }
+
+  /// Links `child`, which covers trunks left..right, to the node above it: of the two essential
+  /// nodes at its ends the one with the longer prefix.
+  ZKD_HOST_DEVICE
+  void link(Link child, std::uint32_t left, std::uint32_t right, const std::uint8_t* levels) const {
+    const bool has_left = left > 0;
+    const bool has_right = right + 1 < trunks;
+    Parent parent;
+    if (!has_left && !has_right) {
+      *root = child;
+    } else {
+      const bool after = has_left && (!has_right || levels[left - 1] > levels[right]);
+      const std::uint32_t node = after ? left - 1 : right;
+      const std::uint32_t side = after ? 1 : 0;
+      parent = {node * 2 + side};
+      links[stride * node + side] = child;
+    }
+    Parent* parents = child.is_leaf() ? parents_of_leaves : parents_of_nodes;
+    if (parents != nullptr) parents[child.index()] = parent;
+  }
+};
+
+struct LinkTrunk {
+  const std::uint8_t* levels;
+  LinkWriter writer;
+
+  ZKD_HOST_DEVICE
+  void load() { writer.load(); }
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t trunk) const {
+    writer.link(Link::leaf(trunk), trunk, trunk, levels);
+  }
+};
+
+struct LinkEssentialNode {
+  const TrunkKey* trunk_keys;
+  const std::uint8_t* levels;
+  LinkWriter writer;
+
+  ZKD_HOST_DEVICE
+  void load() { writer.load(); }
+
+  /// The trunks below a node are those with its prefix: neighbours, since keys are sorted.
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t node) const {
+    const std::uint32_t level = levels[node];
+    const TrunkKey lowest = lowest_below(trunk_keys[node], level);
+    const TrunkKey highest = highest_below(trunk_keys[node], level);
+    const std::uint32_t left =
+        node - run_length(node, [&](std::uint32_t n) { return !(trunk_keys[node - n] < lowest); });
+    const std::uint32_t right =
+        node + 1 + run_length(writer.trunks - node - 2, [&](std::uint32_t n) {
+          return !(highest < trunk_keys[node + 1 + n]);
+        });
+    writer.link(Link::node(node), left, right, levels);
+  }
+};
+
+}  // namespace zkd::core

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Stage 3, Morton encoding: interleaved lattice coordinates of a triangle's centre, and back.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/geometry.hpp>
+#include <zkd/lattice.hpp>
+
+#include "core/arithmetic.hpp"
+
+namespace zkd::core {
+
+/// Moves the low bits of a number to the set bits of a mask and back (Warren, Hacker's Delight,
+/// 7-4 and 7-5: compress and expand with the moves computed once). Unlike pdep and pext it runs in
+/// vectors, on the device, and at the same speed on every processor.
+struct BitDealer {
+  std::uint64_t mask = 0;
+  std::uint64_t moves[6] = {};
+
+  BitDealer() = default;
+
+  ZKD_HOST_DEVICE
+  explicit BitDealer(std::uint64_t the_mask) : mask(the_mask) {
+    std::uint64_t m = mask;
+    std::uint64_t to_count = ~m << 1;  // bits below which there are unset ones
+    for (int i = 0; i < 6; ++i) {
+      std::uint64_t parity = to_count ^ (to_count << 1);
+      for (int shift = 2; shift < 64; shift *= 2) parity ^= parity << shift;
+      moves[i] = parity & m;
+      m = (m ^ moves[i]) | (moves[i] >> (1 << i));
+      to_count &= ~parity;
+    }
+  }
+
+  /// expand: bit i of `x` goes to the i-th set bit of the mask.
+  template <class Code>
+  [[nodiscard]] ZKD_HOST_DEVICE
+  Code deal(Code x) const {
+    constexpr int steps = sizeof(Code) == 4 ? 5 : 6;
+    for (int i = steps - 1; i >= 0; --i) {
+      const Code move = static_cast<Code>(moves[i]);
+      const Code shifted = static_cast<Code>(x << (1 << i));
+      x = (x & ~move) | (shifted & move);
+    }
+    return x & static_cast<Code>(mask);
+  }
+
+  /// compress: the i-th set bit of the mask in `x` becomes bit i.
+  [[nodiscard]] ZKD_HOST_DEVICE
+  std::uint64_t collect(std::uint64_t x) const {
+    x &= mask;
+    for (int i = 0; i < 6; ++i) {
+      const std::uint64_t moved = x & moves[i];
+      x = (x ^ moved) | (moved >> (1 << i));
+    }
+    return x;
+  }
+};
+
+/// Centre of a box along one axis: exact in double but for floats 2^29 times apart.
+ZKD_HOST_DEVICE
+inline double centre(const Box& box, int a) {
+  return (static_cast<double>(box.lo[a]) + static_cast<double>(box.hi[a])) * 0.5;
+}
+
+/// A lattice made ready for many codes.
+struct MortonCoder {
+  double inverse_cell[3];
+  std::int32_t origin[3];
+  BitDealer dealer[3];
+
+  MortonCoder() = default;
+
+  ZKD_HOST_DEVICE
+  explicit MortonCoder(const Lattice& lattice) {
+    for (int a = 0; a < 3; ++a) {
+      inverse_cell[a] = power_of_two(-lattice.exponent[a]);
+      origin[a] = lattice.origin[a];
+      dealer[a] = BitDealer(lattice.mask[a]);
+    }
+  }
+
+  /// The code of a point inside the lattice, right-aligned. An axis without bits adds none.
+  template <class Code>
+  [[nodiscard]] ZKD_HOST_DEVICE
+  Code encode(const double (&point)[3]) const {
+    Code code = 0;
+    for (int a = 0; a < 3; ++a) {
+      const std::int32_t cell = floor_to_int(point[a] * inverse_cell[a]) - origin[a];
+      code |= dealer[a].template deal<Code>(static_cast<Code>(static_cast<std::uint32_t>(cell)));
+    }
+    return code;
+  }
+
+  /// Coordinate along axis `a` of the cell that `code` names.
+  [[nodiscard]] ZKD_HOST_DEVICE
+  std::uint32_t cell(std::uint64_t code, int a) const {
+    return static_cast<std::uint32_t>(dealer[a].collect(code));
+  }
+};
+
+/// One triangle: the code of its box's centre. `ids` names the triangles to encode, or is null for
+/// all.
+template <class Code>
+struct EncodeTriangle {
+  const Box* boxes;
+  const std::uint32_t* ids;
+  const MortonCoder* coder;
+  Code* codes;
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t i) const {
+    const Box& box = boxes[ids != nullptr ? ids[i] : i];
+    const double point[3] = {centre(box, 0), centre(box, 1), centre(box, 2)};
+    codes[i] = coder->template encode<Code>(point);
+  }
+};
+
+}  // namespace zkd::core

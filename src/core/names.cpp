@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The names of options, stages and skips.
+#include <zkd/options.hpp>
+#include <zkd/statistics.hpp>
+
+#include <array>
+#include <cstddef>
+
+namespace zkd {
+namespace {
+
+template <class Enum, std::size_t n>
+const char* name_of(const std::array<const char*, n>& names, Enum value) noexcept {
+  const auto index = static_cast<std::size_t>(value);
+  return index < n ? names[index] : "unknown";
+}
+
+}  // namespace
+
+const char* to_string(Backend value) noexcept {
+  return name_of(std::array{"auto", "cpu", "cuda"}, value);
+}
+const char* to_string(References value) noexcept {
+  return name_of(std::array{"once", "budget", "all", "auto"}, value);
+}
+const char* to_string(Builder value) noexcept {
+  return name_of(std::array{"morton", "sah", "wu2011"}, value);
+}
+const char* to_string(Quality value) noexcept {
+  return name_of(std::array{"fast", "balanced", "high"}, value);
+}
+const char* to_string(InvalidTriangles value) noexcept {
+  return name_of(std::array{"error", "skip"}, value);
+}
+const char* to_string(AxisOrder value) noexcept {
+  return name_of(std::array{"extent", "cyclic"}, value);
+}
+const char* to_string(Stage stage) noexcept {
+  return name_of(std::array{"validate", "encode", "sort", "recode", "trunks", "essential_nodes",
+                            "path_compression", "split_planes", "references", "tight_boxes"},
+                 stage);
+}
+const char* to_string(Skip skip) noexcept {
+  return name_of(std::array{"radix passes", "flat axes", "wide codes", "recoding", "compaction"},
+                 skip);
+}
+
+}  // namespace zkd

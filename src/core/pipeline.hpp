@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The Morton builder, start to end, over the verbs of a backend: Li, Wang, Deng, Fully Parallel
+// Kd-Tree Construction for Real-Time Ray Tracing, I3D 2014. Each step is one file of this folder.
+//
+// Every step is a fixed number of passes over all elements; none goes level by level, and nothing
+// here recurses. The verbs are described in core/verbs.hpp.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/geometry.hpp>
+#include <zkd/options.hpp>
+#include <zkd/statistics.hpp>
+#include <zkd/tree.hpp>
+
+#include "core/arena.hpp"
+#include "core/boxes.hpp"
+#include "core/compress.hpp"
+#include "core/essential.hpp"
+#include "core/key.hpp"
+#include "core/lattice.hpp"
+#include "core/morton.hpp"
+#include "core/planes.hpp"
+#include "core/recode.hpp"
+#include "core/references.hpp"
+#include "core/trunks.hpp"
+#include "core/validate.hpp"
+#include "core/verbs.hpp"
+
+namespace zkd::core {
+
+/// Small results of the stages, in the backend's memory.
+struct BuildState {
+  ValidationReport report;
+  Lattice lattice;
+  MortonCoder coder;
+  SceneFrame frame;
+  Link root;
+  std::uint32_t left_out = 0;  ///< triangles that are not valid
+  std::uint32_t crowded_trunks = 0;
+  std::uint32_t crowded_triangles = 0;
+  std::uint32_t trunks = 0;
+  std::uint32_t nodes = 0;
+  std::uint64_t references_needed = 0;
+  std::uint32_t references = 0;
+};
+
+/// Everything whose size follows from the number of triangles.
+template <class Code>
+struct Workspace {
+  BuildState* state;
+  Box* boxes;
+  SortBuffers<Code> sort;
+  std::uint32_t* first;  ///< position of the first triangle of each trunk, and the end
+  TrunkKey* trunk_keys;
+  std::uint8_t* levels;
+  Parent* parents_of_nodes;
+  Parent* parents_of_leaves;
+  std::uint32_t* arrivals;
+
+  void lay_out(Arena& arena, std::size_t triangles) {
+    state = arena.take<BuildState>(1);
+    boxes = arena.take<Box>(triangles);
+    sort = {arena.take<Code>(triangles), arena.take<std::uint32_t>(triangles),
+            arena.take<Code>(triangles), arena.take<std::uint32_t>(triangles)};
+    first = arena.take<std::uint32_t>(triangles + 1);
+    trunk_keys = arena.take<TrunkKey>(triangles);
+    levels = arena.take<std::uint8_t>(triangles);
+    parents_of_nodes = arena.take<Parent>(triangles);
+    parents_of_leaves = arena.take<Parent>(triangles);
+    arrivals = arena.take<std::uint32_t>(triangles);
+  }
+};
+
+/// For References::all.
+struct ReferenceWorkspace {
+  SortBuffers<std::uint32_t> sort;  ///< keys: leaves; values: triangles
+
+  void lay_out(Arena& arena, std::size_t references) {
+    sort = {arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references),
+            arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references)};
+  }
+};
+
+/// Lattice, coder and frame from what validation found.
+struct PrepareScene {
+  BuildState* state;
+  std::uint32_t triangle_count;
+  std::uint32_t code_bits_asked;
+  AxisOrder order;
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t) const {
+    const std::uint32_t bits = choose_code_bits(code_bits_asked, state->report.valid);
+    state->left_out = triangle_count - state->report.valid;
+    state->root = Link{};
+    state->crowded_trunks = 0;
+    state->crowded_triangles = 0;
+    state->lattice = make_lattice(widen(state->report.bounds), bits, order);
+    state->coder = MortonCoder(state->lattice);
+    state->frame = SceneFrame(state->report.bounds);
+  }
+};
+
+struct CountNodes {
+  BuildState* state;
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t) const { state->nodes = state->trunks > 0 ? state->trunks - 1 : 0; }
+};
+
+struct ReferenceOnce {
+  BuildState* state;
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t) const { state->references = state->report.valid; }
+};
+
+/// Puts the end behind the offsets of all leaves.
+struct CloseOffsets {
+  BuildState* state;
+  std::uint32_t* leaf_offsets;
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t) const { leaf_offsets[state->trunks] = state->references; }
+};
+
+/// One build. `Code` only has to hold the bits of the lattice: it does not change the tree.
+template <class Code, class Backend>
+class MortonPipeline {
+ public:
+  MortonPipeline(Backend& backend, const TriangleView& triangles, const BuildOptions& options)
+      : backend_(backend),
+        triangles_(triangles),
+        options_(options),
+        triangle_count_(static_cast<std::uint32_t>(triangles.triangle_count)) {}
+
+  /// Runs all stages. The tree's arrays are the backend's; `check(report)` may stop the build where
+  /// the backend can look at what validation found.
+  template <class Check>
+  void run(const Check& check) {
+    Workspace<Code> work;
+    backend_.take(work, triangle_count_);
+    state_ = work.state;
+
+    validate(work);
+    check(state_->report);
+    encode(work);
+    backend_.stage(Stage::sort);
+    work.sort = backend_.radix_sort(work.sort, valid(), code_bits_bound());
+
+    const SortedKeys<Code> keys = recode(work);
+    find_trunks(work, keys);
+    link_nodes(work);
+    place_planes(work);
+    list_references(work);
+    close_boxes(work);
+  }
+
+  [[nodiscard]] const BuildState& state() const { return *state_; }
+
+ private:
+  [[nodiscard]] Count valid() const { return {&state_->report.valid, triangle_count_}; }
+  [[nodiscard]] Count trunks() const { return {&state_->trunks, triangle_count_}; }
+  [[nodiscard]] Count nodes() const { return {&state_->nodes, triangle_count_}; }
+
+  /// Bits that a code may have; the lattice may use fewer, whose digits the sort leaves out.
+  [[nodiscard]] std::uint32_t code_bits_bound() const {
+    return options_.code_bits != 0 ? options_.code_bits
+                                   : static_cast<std::uint32_t>(8 * sizeof(Code));
+  }
+
+  void validate(Workspace<Code>& work) {
+    backend_.stage(Stage::validate);
+    backend_.reduce(Count{nullptr, triangle_count_}, &state_->report,
+                    ValidateTriangle{triangles_, work.boxes});
+    backend_.for_each(
+        one, PrepareScene{state_, triangle_count_, options_.code_bits, options_.axis_order});
+  }
+
+  void encode(Workspace<Code>& work) {
+    backend_.stage(Stage::encode);
+    std::uint32_t* ids = work.sort.values;
+    if (backend_.may_exist(Count{&state_->left_out, triangle_count_}))
+      backend_.select(Count{nullptr, triangle_count_}, IsListed{work.boxes}, ids,
+                      &state_->report.valid);
+    else
+      backend_.for_each(valid(), Number{ids});
+    backend_.for_each(valid(),
+                      EncodeTriangle<Code>{work.boxes, ids, &state_->coder, work.sort.keys});
+  }
+
+  SortedKeys<Code> recode(Workspace<Code>& work) {
+    backend_.stage(Stage::recode);
+    SortedKeys<Code> keys{work.sort.keys, nullptr, &state_->lattice.code_bits};
+    if (!options_.recode_crowded) return keys;
+    SecondRound<Code, Backend> round{work.boxes,
+                                     work.sort.keys,
+                                     work.sort.values,
+                                     valid(),
+                                     options_.leaf_size,
+                                     options_.axis_order,
+                                     &state_->crowded_trunks,
+                                     &state_->crowded_triangles,
+                                     work.sort.other_values,  // free again after the sort
+                                     work.first};             // not yet in use
+    round.run(backend_);
+    recoded_ = round.work;
+    keys.fine = recoded_.fine;
+    return keys;
+  }
+
+  void find_trunks(Workspace<Code>& work, const SortedKeys<Code>& keys) {
+    backend_.stage(Stage::trunks);
+    backend_.select(valid(),
+                    BeginsTrunk<SortedKeys<Code>>{keys, &state_->report.valid, options_.leaf_size},
+                    work.first, &state_->trunks);
+    backend_.for_each(one, CountNodes{state_});
+    backend_.for_each(trunks(), TrunkKeyOf<SortedKeys<Code>>{keys, work.first, work.trunk_keys});
+    backend_.allocate_tree(trunks());
+  }
+
+  void link_nodes(Workspace<Code>& work) {
+    backend_.stage(Stage::essential_nodes);
+    backend_.for_each(nodes(), EssentialLevel{work.trunk_keys, work.levels});
+
+    backend_.stage(Stage::path_compression);
+    const LinkWriter writer{backend_.nodes()->child, sizeof(Node) / sizeof(Link),
+                            work.parents_of_nodes,   work.parents_of_leaves,
+                            &state_->root,           &state_->trunks};
+    backend_.for_each(trunks(), LinkTrunk{work.levels, writer});
+    backend_.for_each(nodes(), LinkEssentialNode{work.trunk_keys, work.levels, writer});
+  }
+
+  void place_planes(Workspace<Code>& work) {
+    backend_.stage(Stage::split_planes);
+    Node* nodes = backend_.nodes();
+    const CrowdByPosition crowd{work.first, recoded_.first, &state_->crowded_trunks,
+                                recoded_.lattices};
+    backend_.for_each(this->nodes(),
+                      PlaceSplitPlane<CrowdByPosition>{
+                          work.trunk_keys,
+                          work.levels,
+                          &state_->lattice,
+                          &state_->coder,
+                          crowd,
+                          &state_->frame.scale,
+                          {&nodes->axis, &nodes->plane, sizeof(Node) / sizeof(float)}});
+  }
+
+  void list_references(Workspace<Code>& work) {
+    backend_.stage(Stage::references);
+    if (options_.references == References::once) {
+      backend_.for_each(one, ReferenceOnce{state_});
+      backend_.allocate_references(valid());
+      backend_.for_each(valid(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
+      backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.first, backend_.leaf_offsets()});
+      backend_.for_each(one, CloseOffsets{state_, backend_.leaf_offsets()});
+      return;
+    }
+    const CellWalk walk{triangles_, backend_.nodes(), &state_->root, &state_->frame};
+    std::uint32_t* offsets = work.sort.other_values;  // free again
+    backend_.exclusive_scan(valid(), CountReferences{walk, work.sort.values}, offsets,
+                            &state_->references_needed);
+    const Count references =
+        backend_.admit_references(&state_->references_needed, &state_->references);
+    ReferenceWorkspace pairs{};
+    backend_.take(pairs, backend_.size(references));
+    backend_.for_each(valid(), WriteReferences{walk, work.sort.values, offsets, pairs.sort.keys,
+                                               pairs.sort.values});
+    pairs.sort =
+        backend_.radix_sort(pairs.sort, references, bits_to_count(backend_.size(trunks())));
+    backend_.allocate_references(references);
+    backend_.for_each(references, CopyTo<std::uint32_t>{pairs.sort.values, backend_.references()});
+    backend_.for_each(trunks(),
+                      LeafOffset{pairs.sort.keys, &state_->references, backend_.leaf_offsets()});
+    backend_.for_each(one, CloseOffsets{state_, backend_.leaf_offsets()});
+  }
+
+  void close_boxes(Workspace<Code>& work) {
+    backend_.stage(Stage::tight_boxes);
+    backend_.for_each(nodes(), Fill{work.arrivals, 0});
+    backend_.climb(trunks(), work.arrivals,
+                   TightBoxes{work.boxes, backend_.leaf_offsets(), backend_.references(),
+                              work.parents_of_nodes, work.parents_of_leaves, &state_->frame,
+                              options_.references == References::all, backend_.nodes()});
+  }
+
+  Backend& backend_;
+  const TriangleView& triangles_;
+  const BuildOptions& options_;
+  std::uint32_t triangle_count_;
+  BuildState* state_ = nullptr;
+  RecodeWorkspace recoded_{};
+};
+
+}  // namespace zkd::core

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Stage 5, crowded trunks: triangles that share one code, more than a leaf should hold, are coded
+// again on a lattice over their own centres. A second round of the same stages, on those alone.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/geometry.hpp>
+#include <zkd/lattice.hpp>
+
+#include "core/arena.hpp"
+#include "core/key.hpp"
+#include "core/lattice.hpp"
+#include "core/morton.hpp"
+#include "core/search.hpp"
+#include "core/verbs.hpp"
+
+namespace zkd::core {
+
+/// Bits of a second-round code.
+inline constexpr std::uint32_t fine_bits = 32;
+
+/// Whether a crowded trunk begins with the i-th sorted triangle.
+template <class Code>
+struct BeginsCrowdedTrunk {
+  const Code* codes;
+  const std::uint32_t* code_count;
+  std::uint32_t leaf_size;
+  std::uint32_t count = 0;
+
+  ZKD_HOST_DEVICE
+  void load() { count = *code_count; }
+
+  ZKD_HOST_DEVICE
+  bool operator()(std::uint32_t i) const {
+    if (i >= count - smaller(count, leaf_size) || codes[i] != codes[i + leaf_size]) return false;
+    return i == 0 || codes[i - 1] != codes[i];
+  }
+};
+
+/// Triangles in the c-th crowded trunk: codes are sorted, so gallop to its end.
+template <class Code>
+struct CrowdedTrunkLength {
+  const Code* codes;
+  const std::uint32_t* code_count;
+  const std::uint32_t* first;
+  std::uint32_t count = 0;
+
+  ZKD_HOST_DEVICE
+  void load() { count = *code_count; }
+
+  ZKD_HOST_DEVICE
+  std::uint32_t operator()(std::uint32_t c) const {
+    const std::uint32_t begin = first[c];
+    return 1 + run_length(count - 1 - begin,
+                          [&](std::uint32_t n) { return codes[begin + n] == codes[begin]; });
+  }
+};
+
+/// The triangles of crowded trunks, numbered without the others: number k is in trunk c from
+/// offsets[c] on.
+struct CrowdedTriangles {
+  const std::uint32_t* first;    ///< position of each crowded trunk
+  const std::uint32_t* offsets;  ///< number of its first triangle
+  const std::uint32_t* trunks;   ///< how many crowded trunks
+
+  struct Place {
+    std::uint32_t trunk;
+    std::uint32_t position;
+  };
+  [[nodiscard]] ZKD_HOST_DEVICE
+  Place operator[](std::uint32_t k) const {
+    const std::uint32_t trunk = last_at_or_before(offsets, *trunks, k);
+    return {trunk, first[trunk] + (k - offsets[trunk])};
+  }
+};
+
+/// Adds the centre of triangle k of the crowded ones to the box of its crowded trunk.
+struct IncludeCentre {
+  const Box* boxes;
+  const std::uint32_t* ids;
+  const std::uint32_t* first;
+  const std::uint32_t* offsets;
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t trunk, std::uint32_t k, WideBox& box) const {
+    const Box& triangle = boxes[ids[first[trunk] + (k - offsets[trunk])]];
+    box.include({centre(triangle, 0), centre(triangle, 1), centre(triangle, 2)});
+  }
+};
+
+/// The c-th crowded trunk: a lattice over its centres.
+struct CrowdedLattice {
+  const WideBox* centres;
+  AxisOrder order;
+  Lattice* lattices;
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t c) const {
+    lattices[c] = make_lattice(centres[c], fine_bits, order);
+  }
+};
+
+/// Triangle k of the crowded ones: its trunk and second-round code as one number to sort by.
+struct RecodeTriangle {
+  const Box* boxes;
+  const std::uint32_t* ids;
+  CrowdedTriangles crowded;
+  const Lattice* lattices;
+  std::uint64_t* fine_keys;
+  std::uint32_t* fine_ids;
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t k) const {
+    const CrowdedTriangles::Place place = crowded[k];
+    const std::uint32_t id = ids[place.position];
+    const Lattice& lattice = lattices[place.trunk];
+    const Box& box = boxes[id];
+    const double point[3] = {centre(box, 0), centre(box, 1), centre(box, 2)};
+    const auto code = MortonCoder(lattice).encode<std::uint64_t>(point);
+    fine_keys[k] =
+        (static_cast<std::uint64_t>(place.trunk) << 32) | (code << (fine_bits - lattice.code_bits));
+    fine_ids[k] = id;
+  }
+};
+
+/// Puts triangle k of the crowded ones, sorted, back among the others.
+struct PlaceRecoded {
+  CrowdedTriangles crowded;
+  const std::uint64_t* fine_keys;
+  const std::uint32_t* fine_ids;
+  std::uint32_t* ids;
+  std::uint32_t* fine;
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t k) const {
+    const std::uint32_t position = crowded[k].position;
+    ids[position] = fine_ids[k];
+    fine[position] = static_cast<std::uint32_t>(fine_keys[k]);
+  }
+};
+
+/// The number of its crowded trunk, for every position of the sorted order that has one.
+struct NumberCrowd {
+  CrowdedTriangles crowded;
+  std::uint32_t* crowd;
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t k) const {
+    const CrowdedTriangles::Place place = crowded[k];
+    crowd[place.position] = place.trunk;
+  }
+};
+
+/// Memory of the second round; taken only where a trunk may be crowded.
+struct RecodeWorkspace {
+  std::uint32_t* first = nullptr;
+  std::uint32_t* offsets = nullptr;
+  WideBox* centres = nullptr;
+  Lattice* lattices = nullptr;
+  SortBuffers<std::uint64_t> sort{};
+  std::uint32_t* fine = nullptr;
+
+  void lay_out(Arena& arena, std::size_t triangles, std::size_t trunks, std::size_t crowded) {
+    first = arena.take<std::uint32_t>(trunks);
+    offsets = arena.take<std::uint32_t>(trunks);
+    centres = arena.take<WideBox>(trunks);
+    lattices = arena.take<Lattice>(trunks);
+    sort = {arena.take<std::uint64_t>(crowded), arena.take<std::uint32_t>(crowded),
+            arena.take<std::uint64_t>(crowded), arena.take<std::uint32_t>(crowded)};
+    fine = arena.take<std::uint32_t>(triangles);
+  }
+};
+
+/// Bits needed to write the numbers below `count`.
+inline std::uint32_t bits_to_count(std::uint32_t count) {
+  return count > 1 ? 64 - leading_zeros(count - 1) : 1;
+}
+
+/// The most crowded trunks that `triangles` can make.
+inline std::uint32_t most_crowded_trunks(std::uint32_t triangles, std::uint32_t leaf_size) {
+  return triangles / (leaf_size + 1);
+}
+
+/// The second round, start to end.
+template <class Code, class Backend>
+class SecondRound {
+ public:
+  const Box* boxes;
+  const Code* codes;   ///< sorted
+  std::uint32_t* ids;  ///< of the triangles, in that order; permuted within crowded trunks
+  Count triangles;
+  std::uint32_t leaf_size;
+  AxisOrder order;
+  std::uint32_t* trunk_count;      ///< out: crowded trunks
+  std::uint32_t* triangle_count;   ///< out: triangles in them
+  std::uint32_t* first_scratch;    ///< room for one number per triangle
+  std::uint32_t* offsets_scratch;  ///< likewise
+
+  RecodeWorkspace work{};
+
+  [[nodiscard]] CrowdedTriangles members() const { return {work.first, work.offsets, trunk_count}; }
+
+  /// Leaves `work` empty where no trunk can be crowded.
+  void run(Backend& backend) {
+    // load() reads counts through a pointer; one whose bound is exact is its own place.
+    const std::uint32_t* count = triangles.actual != nullptr ? triangles.actual : &triangles.bound;
+    backend.select(triangles, BeginsCrowdedTrunk<Code>{codes, count, leaf_size}, first_scratch,
+                   trunk_count);
+    const Count trunks{trunk_count, most_crowded_trunks(triangles.bound, leaf_size)};
+    if (!backend.may_exist(trunks)) return;
+
+    backend.exclusive_scan(trunks, CrowdedTrunkLength<Code>{codes, count, first_scratch},
+                           offsets_scratch, triangle_count);
+    const Count crowded{triangle_count, triangles.bound};
+    backend.take(work, triangles.bound, backend.size(trunks), backend.size(crowded));
+    backend.for_each(trunks, CopyTo<std::uint32_t>{first_scratch, work.first});
+    backend.for_each(trunks, CopyTo<std::uint32_t>{offsets_scratch, work.offsets});
+
+    backend.segmented_reduce(trunks, work.offsets, crowded, work.centres,
+                             IncludeCentre{boxes, ids, work.first, work.offsets});
+    backend.for_each(trunks, CrowdedLattice{work.centres, order, work.lattices});
+    backend.for_each(crowded, RecodeTriangle{boxes, ids, members(), work.lattices, work.sort.keys,
+                                             work.sort.values});
+    work.sort =
+        backend.radix_sort(work.sort, crowded, fine_bits + bits_to_count(backend.size(trunks)));
+    backend.for_each(triangles, Fill{work.fine, 0});
+    backend.for_each(crowded,
+                     PlaceRecoded{members(), work.sort.keys, work.sort.values, ids, work.fine});
+  }
+};
+
+}  // namespace zkd::core

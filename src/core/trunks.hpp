@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Stage 6, trunks: the leaves. Conceptually the largest nodes of the complete binary tree with at
+// most leaf_size triangles.
+#pragma once
+
+#include <cstdint>
+
+#include "core/key.hpp"
+
+namespace zkd::core {
+
+/// Whether a trunk begins with triangle i.
+///
+/// Neighbours i - 1 and i part at some node of the conceptual tree. That node stays a node, and a
+/// trunk begins at i, if it holds more than leaf_size triangles: if leaf_size + 1 triangles in a
+/// row, i - 1 and i among them, all lie below it. Looking at leaf_size rows of keys answers that
+/// without knowing the tree.
+template <class Keys>
+struct BeginsTrunk {
+  Keys keys;
+  const std::uint32_t* key_count;
+  std::uint32_t leaf_size;
+  std::uint32_t count = 0;
+
+  ZKD_HOST_DEVICE
+  void load() {
+    keys.load();
+    count = *key_count;
+  }
+
+  ZKD_HOST_DEVICE
+  bool operator()(std::uint32_t i) const {
+    if (i == 0) return true;
+    const std::uint32_t level = parting_level(keys[i - 1], keys[i]);
+    if (level == level_count || count <= leaf_size) return false;
+    const std::uint32_t from = i > leaf_size ? i - leaf_size : 0;
+    const std::uint32_t to = smaller(i - 1, count - 1 - leaf_size);
+    for (std::uint32_t row = from; row <= to; ++row)
+      if (parting_level(keys[row], keys[row + leaf_size]) >= level) return true;
+    return false;
+  }
+};
+
+/// The key of trunk t: that of its first triangle, which has all the bits in which the trunk
+/// differs from others.
+template <class Keys>
+struct TrunkKeyOf {
+  Keys keys;
+  const std::uint32_t* first;
+  TrunkKey* trunk_keys;
+
+  ZKD_HOST_DEVICE
+  void load() { keys.load(); }
+
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t trunk) const { trunk_keys[trunk] = keys[first[trunk]]; }
+};
+
+}  // namespace zkd::core

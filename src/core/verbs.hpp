@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the pipeline asks of a backend, and the small types both speak in.
+//
+// Counts that the scene decides (valid triangles, trunks, ...) live where the data is. A Count
+// names one together with a bound that the host knows, so that nothing has to come back to the host
+// in the middle of a build.
+//
+// A backend has these verbs; arrays are in the backend's own memory.
+//
+//   stage(Stage)                       names the work that follows, for clocks and profilers
+//   for_each(count, f)                 f(i)
+//   reduce(count, &out, f)             out = T{}; f(i, out) for all i, in any grouping (T::combine)
+//   select(count, f, out, &total)      the i for which f(i), in order
+//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
+//   segmented_reduce(segments, offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s])
+//   radix_sort(buffers, count, bits)   stable; says in which of the buffers the result is
+//   climb(leaves, arrivals, f)         f.begin(leaf), then f.rise(node) for each node whose second
+//                                      child has arrived
+//   may_exist(count), size(count)      what the host knows; where only the device does: true, bound
+//   admit_references(needed, out)      whether a tree can hold that many
+//   take(layout, counts...)            arrays until the build ends
+//   allocate_tree, allocate_references the arrays of the tree
+//
+// A functor with a member load() has it called once per thread before its first element: there it
+// reads numbers that earlier stages left in the backend's memory.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/config.hpp>
+
+namespace zkd::core {
+
+/// How many elements a pass works on.
+struct Count {
+  const std::uint32_t* actual = nullptr;  ///< in the backend's memory; null: exactly `bound`
+  std::uint32_t bound = 0;                ///< known to the host
+};
+
+/// A pass over a single element: work for one thread.
+inline constexpr Count one{nullptr, 1};
+
+/// Keys and values, and room to move them to and fro.
+template <class Key>
+struct SortBuffers {
+  Key* keys;
+  std::uint32_t* values;
+  Key* other_keys;
+  std::uint32_t* other_values;
+};
+
+template <class T>
+struct CopyTo {
+  const T* from;
+  T* to;
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t i) const { to[i] = from[i]; }
+};
+
+struct Fill {
+  std::uint32_t* array;
+  std::uint32_t value;
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t i) const { array[i] = value; }
+};
+
+/// 0, 1, 2, ...
+struct Number {
+  std::uint32_t* array;
+  ZKD_HOST_DEVICE
+  void operator()(std::uint32_t i) const { array[i] = i; }
+};
+
+}  // namespace zkd::core

@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The verbs of core/pipeline.hpp on OpenMP.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <memory_resource>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <zkd/build.hpp>
+#include <zkd/cpu/executor.hpp>
+#include <zkd/error.hpp>
+#include <zkd/statistics.hpp>
+#include <zkd/tree.hpp>
+
+#include "core/pipeline.hpp"
+#include "cpu/memory.hpp"
+#include "cpu/radix_sort.hpp"
+#include "cpu/threads.hpp"
+
+namespace zkd::cpu {
+
+template <class Functor>
+void load(Functor& f) {
+  if constexpr (requires { f.load(); }) f.load();
+}
+
+class Backend {
+ public:
+  explicit Backend(const Executor& executor)
+      : threads_(executor),
+        memory_(executor.memory != nullptr ? executor.memory : std::pmr::get_default_resource()) {}
+
+  // --- passes ---
+
+  template <class Functor>
+  void for_each(core::Count count, Functor f) {
+    threads_.share(size(count), grain, [f](Range range) mutable {
+      load(f);
+      for (std::uint32_t i = range.begin; i < range.end; ++i) f(i);
+    });
+  }
+
+  template <class T, class Functor>
+  void reduce(core::Count count, T* out, Functor f) {
+    const std::uint32_t n = size(count);
+    const int team = threads_.team(n);
+    Scratch<T> parts(*this, static_cast<std::size_t>(team));
+    threads_.divide(n, team, [f, parts = parts.data](Range range, int thread) mutable {
+      load(f);
+      T mine{};
+      for (std::uint32_t i = range.begin; i < range.end; ++i) f(i, mine);
+      parts[thread] = mine;
+    });
+    *out = T{};
+    for (int thread = 0; thread < team; ++thread) out->combine(parts.data[thread]);
+  }
+
+  /// Every thread writes what it selects to the place where all of its part would go; then the
+  /// parts are closed up.
+  template <class Functor>
+  void select(core::Count count, Functor f, std::uint32_t* out, std::uint32_t* total) {
+    const std::uint32_t n = size(count);
+    const int team = threads_.team(n);
+    Scratch<std::uint32_t> selected(*this, static_cast<std::size_t>(team));
+    threads_.divide(n, team, [f, out, selected = selected.data](Range range, int thread) mutable {
+      load(f);
+      std::uint32_t* to = out + range.begin;
+      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        *to = i;  // kept only if the place is not taken again; without a branch
+        to += f(i) ? 1 : 0;
+      }
+      selected[thread] = static_cast<std::uint32_t>(to - (out + range.begin));
+    });
+    std::uint32_t end = 0;
+    for (int thread = 0; thread < team; ++thread) {
+      const std::uint32_t begin = Threads::part(n, thread, team).begin;
+      if (begin != end) std::memmove(out + end, out + begin, selected.data[thread] * sizeof *out);
+      end += selected.data[thread];
+    }
+    *total = end;
+  }
+
+  template <class Functor, class Total>
+  void exclusive_scan(core::Count count, Functor f, std::uint32_t* out, Total* total) {
+    const std::uint32_t n = size(count);
+    const int team = threads_.team(n);
+    Scratch<std::uint64_t> sums(*this, static_cast<std::size_t>(team));
+    threads_.divide(n, team, [f, out, sums = sums.data](Range range, int thread) mutable {
+      load(f);
+      std::uint64_t sum = 0;
+      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        const std::uint32_t value = f(i);
+        out[i] = static_cast<std::uint32_t>(sum);
+        sum += value;
+      }
+      sums[thread] = sum;
+    });
+    std::uint64_t before = 0;
+    for (int thread = 0; thread < team; ++thread)
+      before += std::exchange(sums.data[thread], before);
+    *total = static_cast<Total>(before);
+    if (team > 1)
+      threads_.divide(n, team, [out, sums = sums.data](Range range, int thread) {
+        const auto add = static_cast<std::uint32_t>(sums[thread]);
+        for (std::uint32_t i = range.begin; i < range.end; ++i) out[i] += add;
+      });
+  }
+
+  /// Elements are divided evenly, whatever the segments: a thread that begins inside one leaves
+  /// what it found there for the thread where the segment begins.
+  template <class T, class Functor>
+  void segmented_reduce(core::Count segment_count, const std::uint32_t* offsets,
+                        core::Count element_count, T* out, Functor f) {
+    const std::uint32_t segments = size(segment_count);
+    const std::uint32_t elements = size(element_count);
+    const int team = threads_.team(elements);
+    struct Head {
+      T value{};
+      std::uint32_t segment = 0;
+    };
+    Scratch<Head> heads(*this, static_cast<std::size_t>(team));
+    threads_.divide(elements, team, [=, heads = heads.data](Range range, int thread) mutable {
+      load(f);
+      Head head;
+      if (range.begin < range.end) {
+        const auto* const after = std::upper_bound(offsets, offsets + segments, range.begin);
+        auto segment = static_cast<std::uint32_t>(after - offsets) - 1;
+        head.segment = segment;
+        std::uint32_t i = range.begin;
+        while (i < range.end) {
+          const std::uint32_t segment_end =
+              segment + 1 < segments ? offsets[segment + 1] : elements;
+          const bool begins_here = offsets[segment] >= range.begin;
+          T value{};
+          for (; i < std::min(segment_end, range.end); ++i) f(segment, i, value);
+          if (begins_here)
+            out[segment] = value;
+          else
+            head.value = value;
+          ++segment;
+        }
+      }
+      heads[thread] = head;
+    });
+    for (int thread = 1; thread < team; ++thread)
+      out[heads.data[thread].segment].combine(heads.data[thread].value);
+  }
+
+  template <class Key>
+  core::SortBuffers<Key> radix_sort(core::SortBuffers<Key> buffers, core::Count count,
+                                    std::uint32_t bits) {
+    const std::uint32_t n = size(count);
+    SortScratch scratch{};
+    const int team = threads_.team(n);
+    const Block block = lay_out(scratch, team, digits_of(bits));
+    return cpu::radix_sort(threads_, scratch, buffers, n, bits, passes_left_out_);
+  }
+
+  template <class Functor>
+  void climb(core::Count leaves, std::uint32_t* arrivals, Functor f) {
+    threads_.share(size(leaves), grain / 4, [f, arrivals](Range range) mutable {
+      load(f);
+      for (std::uint32_t leaf = range.begin; leaf < range.end; ++leaf) {
+        core::Parent parent = f.begin(leaf);
+        while (!parent.is_none()) {
+          // Releases this child's box to whoever goes on, and acquires the sibling's if that is us.
+          const std::atomic_ref<std::uint32_t> arrived(arrivals[parent.node()]);
+          if (arrived.fetch_add(1, std::memory_order_acq_rel) == 0) break;
+          parent = f.rise(parent.node());
+        }
+      }
+    });
+  }
+
+  // --- what the host knows: here, everything ---
+
+  [[nodiscard]] static std::uint32_t size(core::Count count) {
+    return count.actual != nullptr ? *count.actual : count.bound;
+  }
+  [[nodiscard]] static bool may_exist(core::Count count) { return size(count) != 0; }
+
+  core::Count admit_references(const std::uint64_t* needed, std::uint32_t* out) {
+    if (*needed > max_count)
+      throw Error(ErrorCode::too_many_references, *needed,
+                  "References::all needs " + std::to_string(*needed) +
+                      " references, and a tree holds at most " + std::to_string(max_count));
+    *out = static_cast<std::uint32_t>(*needed);
+    return {out, *out};
+  }
+
+  // --- memory ---
+
+  /// Lays out arrays that live until the build ends.
+  template <class Layout, class... Counts>
+  void take(Layout& layout, Counts... counts) {
+    if (blocks_used_ == max_blocks) throw std::logic_error("zkd: more workspaces than planned");
+    blocks_[blocks_used_++] = lay_out(layout, counts...);
+  }
+
+  /// See zkd::memory_requirement.
+  static MemoryRequirement requirement(const Executor& executor, std::uint64_t triangle_count,
+                                       const BuildOptions& options, bool wide_codes,
+                                       std::uint64_t reference_count) {
+    const auto triangles = static_cast<std::uint32_t>(triangle_count);
+    const std::uint32_t code_bits = wide_codes ? 64 : 32;
+    MemoryRequirement most;
+    most.workspace_bytes = wide_codes ? core::bytes_of(core::Workspace<std::uint64_t>{}, triangles)
+                                      : core::bytes_of(core::Workspace<std::uint32_t>{}, triangles);
+    if (options.recode_crowded) {
+      const std::uint32_t crowded = core::most_crowded_trunks(triangles, options.leaf_size);
+      most.workspace_bytes +=
+          core::bytes_of(core::RecodeWorkspace{}, triangles, crowded, crowded > 0 ? triangles : 0);
+    }
+    if (options.references == References::all)
+      most.workspace_bytes += core::bytes_of(core::ReferenceWorkspace{}, reference_count);
+    // The largest of what single verbs take for themselves.
+    const int team = Threads(executor).available();
+    most.workspace_bytes +=
+        std::max(core::bytes_of(SortScratch{}, team, digits_of(std::max(code_bits, 64u))),
+                 core::bytes_of(typename Scratch<core::ValidationReport>::Layout{},
+                                static_cast<std::size_t>(team)));
+    most.tree_bytes =
+        core::bytes_of(TreeArrays{}, triangles) + reference_count * sizeof(std::uint32_t);
+    return most;
+  }
+
+  void allocate_tree(core::Count trunks) {
+    TreeArrays arrays{};
+    tree_block_ = Block(memory_, core::bytes_of(arrays, size(trunks)));
+    core::Arena arena(tree_block_.data());
+    arrays.lay_out(arena, size(trunks));
+    nodes_ = arrays.nodes;
+    leaf_offsets_ = arrays.leaf_offsets;
+  }
+  void allocate_references(core::Count references) {
+    reference_block_ = Block(memory_, std::size_t{size(references)} * sizeof(std::uint32_t));
+    references_ = static_cast<std::uint32_t*>(reference_block_.data());
+  }
+
+  [[nodiscard]] Node* nodes() const { return nodes_; }
+  [[nodiscard]] std::uint32_t* leaf_offsets() const { return leaf_offsets_; }
+  [[nodiscard]] std::uint32_t* references() const { return references_; }
+
+  /// What a tree consists of, but for its references.
+  struct TreeArrays {
+    Node* nodes;
+    std::uint32_t* leaf_offsets;
+
+    void lay_out(core::Arena& arena, std::size_t leaves) {
+      nodes = arena.take<Node>(leaves > 0 ? leaves - 1 : 0);
+      leaf_offsets = arena.take<std::uint32_t>(leaves + 1);
+    }
+  };
+
+  // --- clocks and counts ---
+
+  void stage(Stage next) {
+    const auto now = std::chrono::steady_clock::now();
+    if (running_ != Stage::count)
+      stage_ms_[static_cast<std::size_t>(running_)] +=
+          std::chrono::duration<double, std::milli>(now - since_).count();
+    running_ = next;
+    since_ = now;
+  }
+  /// Ends the last stage.
+  void finish() { stage(Stage::count); }
+
+  [[nodiscard]] const auto& stage_ms() const { return stage_ms_; }
+  [[nodiscard]] std::uint32_t passes_left_out() const { return passes_left_out_; }
+  [[nodiscard]] std::size_t workspace_bytes() const { return most_held_; }
+  [[nodiscard]] std::pmr::memory_resource* memory() const { return memory_; }
+  [[nodiscard]] const Threads& threads() const { return threads_; }
+  Block& tree_block() { return tree_block_; }
+  Block& reference_block() { return reference_block_; }
+
+ private:
+  /// Working memory of the backend itself, for the time of one verb.
+  template <class T>
+  struct Scratch {
+    T* data;
+    Block block;
+
+    struct Layout {
+      T* array;
+      void lay_out(core::Arena& arena, std::size_t count) { array = arena.take<T>(count); }
+    };
+    Scratch(Backend& backend, std::size_t count) {
+      Layout layout{};
+      block = backend.lay_out(layout, count);
+      data = layout.array;
+    }
+  };
+
+  template <class Layout, class... Counts>
+  Block lay_out(Layout& layout, Counts... counts) {
+    Block block(memory_, core::bytes_of(layout, counts...));
+    core::Arena arena(block.data());
+    layout.lay_out(arena, counts...);
+    std::size_t held = block.bytes();
+    for (int i = 0; i < blocks_used_; ++i) held += blocks_[i].bytes();
+    most_held_ = std::max(most_held_, held);
+    return block;
+  }
+
+  static constexpr int max_blocks = 4;
+
+  Threads threads_;
+  std::pmr::memory_resource* memory_;
+  Block blocks_[max_blocks];
+  int blocks_used_ = 0;
+  std::size_t most_held_ = 0;
+  Block tree_block_;
+  Block reference_block_;
+  Node* nodes_ = nullptr;
+  std::uint32_t* leaf_offsets_ = nullptr;
+  std::uint32_t* references_ = nullptr;
+
+  Stage running_ = Stage::count;
+  std::chrono::steady_clock::time_point since_;
+  std::array<double, static_cast<std::size_t>(Stage::count)> stage_ms_{};
+  std::uint32_t passes_left_out_ = 0;
+};
+
+}  // namespace zkd::cpu

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Blocks from the caller's memory resource.
+#pragma once
+
+#include <cstddef>
+#include <memory_resource>
+#include <new>
+#include <string>
+#include <utility>
+
+#include <zkd/error.hpp>
+
+#include "core/arena.hpp"
+
+namespace zkd::cpu {
+
+/// One block, given back at the end of its life. Every failure to get one is an Error.
+class Block {
+ public:
+  Block() = default;
+  Block(std::pmr::memory_resource* memory, std::size_t bytes) : memory_(memory), bytes_(bytes) {
+    if (bytes == 0) return;
+    try {
+      data_ = memory->allocate(bytes, core::Arena::alignment);
+    } catch (const std::bad_alloc&) {
+      throw Error(ErrorCode::out_of_memory, bytes,
+                  "the memory resource refused " + std::to_string(bytes) + " bytes");
+    }
+  }
+  Block(Block&& other) noexcept
+      : memory_(other.memory_), data_(std::exchange(other.data_, nullptr)), bytes_(other.bytes_) {}
+  Block& operator=(Block&& other) noexcept {
+    std::swap(memory_, other.memory_);
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+    return *this;
+  }
+  ~Block() {
+    if (data_ != nullptr) memory_->deallocate(data_, bytes_, core::Arena::alignment);
+  }
+
+  [[nodiscard]] void* data() const noexcept { return data_; }
+  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
+  /// The caller gives it back from now on.
+  void* release() noexcept { return std::exchange(data_, nullptr); }
+
+ private:
+  std::pmr::memory_resource* memory_ = nullptr;
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace zkd::cpu

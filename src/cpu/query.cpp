@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Queries on the CPU: single rays, spans of rays on all threads, and brute force.
+#include <zkd/query.hpp>
+
+#include <algorithm>
+
+#include "core/traverse.hpp"
+#include "cpu/float_environment.hpp"
+#include "cpu/instruction_set.hpp"
+#include "cpu/threads.hpp"
+
+namespace zkd {
+namespace {
+
+/// Rays that a thread takes at a time.
+constexpr std::uint32_t rays_at_once = 64;
+
+template <bool any>
+core::Candidate trace_one(const TreeView& tree, const TriangleView& triangles,
+                          const Ray& ray) noexcept {
+  const cpu::FloatEnvironment environment;
+  const auto body = [&tree, &triangles](const Ray& one) {
+    return core::trace<any>(tree, triangles, one, nullptr);
+  };
+  return cpu::call(cpu::use_avx2(cpu::InstructionSet::automatic), body, ray);
+}
+
+template <bool any, class Write>
+void trace_all(const cpu::Executor& executor, const TreeView& tree, const TriangleView& triangles,
+               std::span<const Ray> rays, std::size_t count, std::span<TraversalCost> costs,
+               Write write) noexcept {
+  if (!costs.empty()) count = std::min(count, costs.size());
+  const cpu::Threads threads(executor);
+  // A pass counts in 32 bits: longer spans are done in several.
+  constexpr std::size_t most = 1u << 30;
+  for (std::size_t done = 0; done < count; done += most) {
+    const auto n = static_cast<std::uint32_t>(std::min(most, count - done));
+    threads.share(n, rays_at_once, [=](cpu::Range range) {
+      for (std::size_t i = done + range.begin; i < done + range.end; ++i)
+        write(i, core::trace<any>(tree, triangles, rays[i], costs.empty() ? nullptr : &costs[i]));
+    });
+  }
+}
+
+}  // namespace
+
+std::optional<Hit> closest_hit(const TreeView& tree, const TriangleView& triangles,
+                               const Ray& ray) noexcept {
+  const core::Candidate found = trace_one<false>(tree, triangles, ray);
+  if (!found.found()) return std::nullopt;
+  return core::to_hit(found);
+}
+
+bool any_hit(const TreeView& tree, const TriangleView& triangles, const Ray& ray) noexcept {
+  return trace_one<true>(tree, triangles, ray).found();
+}
+
+void closest_hit(const cpu::Executor& executor, const TreeView& tree, const TriangleView& triangles,
+                 std::span<const Ray> rays, std::span<Hit> hits,
+                 std::span<TraversalCost> costs) noexcept {
+  trace_all<false>(
+      executor, tree, triangles, rays, std::min(rays.size(), hits.size()), costs,
+      [hits](std::size_t i, const core::Candidate& found) { hits[i] = core::to_hit(found); });
+}
+
+void any_hit(const cpu::Executor& executor, const TreeView& tree, const TriangleView& triangles,
+             std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+             std::span<TraversalCost> costs) noexcept {
+  trace_all<true>(executor, tree, triangles, rays, std::min(rays.size(), occluded.size()), costs,
+                  [occluded](std::size_t i, const core::Candidate& found) {
+                    occluded[i] = found.found() ? 1 : 0;
+                  });
+}
+
+void closest_hit_brute_force(const cpu::Executor& executor, const TreeView& tree,
+                             const TriangleView& triangles, std::span<const Ray> rays,
+                             std::span<Hit> hits) noexcept {
+  const std::size_t count = std::min(rays.size(), hits.size());
+  const cpu::Threads threads(executor);
+  threads.share(static_cast<std::uint32_t>(count), 1, [=](cpu::Range range) {
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      const core::PreparedRay ray(tree, rays[i]);
+      core::Candidate best;
+      for (std::uint32_t id = 0; ray.valid && id < triangles.triangle_count; ++id) {
+        const core::Corners corners = core::corners_of(triangles, id);
+        core::Candidate candidate = best;
+        // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
+        if (core::intersect(ray, corners, id, candidate) && core::is_valid(corners))
+          best = candidate;
+      }
+      hits[i] = core::to_hit(best);
+    }
+  });
+}
+
+}  // namespace zkd

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Exact predicates: a filter in double, then GMP.
+#include "verify/exact.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "verify/integers.hpp"
+
+namespace zkd::verify {
+namespace {
+
+Point cross(const Point& a, const Point& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+Point corner(const ExactBox& box, unsigned which) {
+  Point result{};
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    result[axis] = (which >> axis & 1U) != 0 ? box.hi[axis] : box.lo[axis];
+  }
+  return result;
+}
+
+bool empty(const ExactBox& box) {
+  return !(box.lo[0] <= box.hi[0] && box.lo[1] <= box.hi[1] && box.lo[2] <= box.hi[2]);
+}
+
+// The sign of (p - q) . w in the plane of axes i and j, w being (b - a) turned by a quarter:
+// (p - q)_i * (b - a)_j - (p - q)_j * (b - a)_i.
+int turned_sign(const Point& p, const Point& q, const Point& a, const Point& b, std::size_t i,
+                std::size_t j) {
+  const double left = (p[i] - q[i]) * (b[j] - a[j]);
+  const double right = (p[j] - q[j]) * (b[i] - a[i]);
+  const double value = left - right;
+  const double permanent = std::abs(left) + std::abs(right);
+  // Two differences, a product and a sum: four roundings, less than the seven of a determinant.
+  if (std::abs(value) > Determinant::bound * permanent) return value > 0.0 ? 1 : -1;
+  if (permanent == 0.0) return 0;
+  const int exponent = common_exponent({p, q, a, b});
+  const auto z = [exponent](double x) { return integer(x, exponent); };
+  const mpz_class exact =
+      (z(p[i]) - z(q[i])) * (z(b[j]) - z(a[j])) - (z(p[j]) - z(q[j])) * (z(b[i]) - z(a[i]));
+  return sgn(exact);
+}
+
+// Whether the plane of the triangle has the whole box strictly on one side.
+bool separated_by_plane(const Corners& corners, const ExactBox& box) {
+  const Point& a = corners[0];
+  int side = 0;
+  for (unsigned which = 0; which < 8; ++which) {
+    // det(corner - a, b - a, c - a), with the roles of determinant_sign: all three are differences.
+    const Point at = corner(box, which);
+    const Determinant filter =
+        determinant(difference(at, a), difference(corners[1], a), difference(corners[2], a));
+    int sign = 0;
+    // One rounding more than the seven that Determinant::bound covers: the first argument.
+    if (std::abs(filter.value) > 1.2 * Determinant::bound * filter.permanent) {
+      sign = filter.value > 0.0 ? 1 : -1;
+    } else if (filter.permanent != 0.0) {
+      const int exponent = common_exponent({at, a, corners[1], corners[2]});
+      const IntegerPoint origin(a, exponent);
+      const IntegerPoint n = cross(IntegerPoint(corners[1], exponent) - origin,
+                                   IntegerPoint(corners[2], exponent) - origin);
+      sign = sgn(dot(IntegerPoint(at, exponent) - origin, n));
+    }
+    if (sign == 0 || (side != 0 && sign != side)) return false;
+    side = sign;
+  }
+  return true;
+}
+
+// Whether some axis perpendicular to edge (a, b) and to one box axis separates strictly.
+bool separated_across_edge(const Corners& corners, const ExactBox& box, const Point& a,
+                           const Point& b) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    const std::size_t k = (i + 2) % 3;
+    // Along w with w_i = (b - a)_j and w_j = -(b - a)_i, the corner of the box that is farthest:
+    Point high = box.lo;
+    Point low = box.lo;
+    (b[j] > a[j] ? high : low)[i] = box.hi[i];
+    (b[i] < a[i] ? high : low)[j] = box.hi[j];
+    // The third axis does not enter; any value does, one of a keeps the common exponent small.
+    high[k] = low[k] = a[k];
+    bool above = true;
+    bool below = true;
+    for (const Point& p : corners) {
+      above = above && turned_sign(p, high, a, b, i, j) > 0;
+      below = below && turned_sign(p, low, a, b, i, j) < 0;
+      if (!above && !below) break;
+    }
+    if (above || below) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::optional<Corners> finite_corners(const TriangleView& triangles, std::size_t triangle) {
+  Corners corners{};
+  for (int corner_index = 0; corner_index < 3; ++corner_index) {
+    const std::uint32_t vertex = triangles.index(triangle, corner_index);
+    if (vertex >= triangles.position_count) return std::nullopt;
+    const float* position = triangles.position(vertex);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!std::isfinite(position[axis])) return std::nullopt;
+      corners[static_cast<std::size_t>(corner_index)][axis] = static_cast<double>(position[axis]);
+    }
+  }
+  return corners;
+}
+
+bool exact_zero_area(const Corners& corners) {
+  // Zero area is a zero cross product: three signs in the coordinate planes.
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (turned_sign(corners[2], corners[0], corners[0], corners[1], i, (i + 1) % 3) != 0) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool valid_triangle(const TriangleView& triangles, std::size_t triangle) {
+  const std::optional<Corners> corners = finite_corners(triangles, triangle);
+  return corners && !exact_zero_area(*corners);
+}
+
+// Separating axes. Two convex polytopes without a common point are strictly separated along a
+// normal of a face of one of them or a cross product of an edge of each; the axes of a box keep
+// their role where its extent along one is zero (a point, a segment, a rectangle), because an axis
+// of the box perpendicular to the lost extent, crossed with the edges of the triangle, takes the
+// place of the in-plane normals.
+bool exact_overlap(const Corners& corners, const ExactBox& box) {
+  if (empty(box)) return false;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto [lo, hi] = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
+    if (lo > box.hi[axis] || hi < box.lo[axis]) return false;
+  }
+  if (separated_by_plane(corners, box)) return false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (separated_across_edge(corners, box, corners[i], corners[(i + 1) % 3])) return false;
+  }
+  return true;
+}
+
+bool exact_overlap(const Corners& corners, const Box& box) {
+  ExactBox exact{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    exact.lo[axis] = static_cast<double>(box.lo[axis]);
+    exact.hi[axis] = static_cast<double>(box.hi[axis]);
+  }
+  return exact_overlap(corners, exact);
+}
+
+double separation(const Corners& corners, const ExactBox& box) {
+  double widest = -std::numeric_limits<double>::infinity();
+  const auto along = [&](const Point& axis) {
+    const double length = std::sqrt(dot(axis, axis));
+    if (!(length > 0.0)) return;
+    // Relative to a corner of the triangle, so that a far scene costs no digits.
+    double triangle_lo = std::numeric_limits<double>::infinity();
+    double triangle_hi = -triangle_lo;
+    for (const Point& p : corners) {
+      const double at = dot(difference(p, corners[0]), axis);
+      triangle_lo = std::min(triangle_lo, at);
+      triangle_hi = std::max(triangle_hi, at);
+    }
+    double box_lo = std::numeric_limits<double>::infinity();
+    double box_hi = -box_lo;
+    for (unsigned which = 0; which < 8; ++which) {
+      const double at = dot(difference(corner(box, which), corners[0]), axis);
+      box_lo = std::min(box_lo, at);
+      box_hi = std::max(box_hi, at);
+    }
+    widest = std::max(widest, std::max(triangle_lo - box_hi, box_lo - triangle_hi) / length);
+  };
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Point unit{};
+    unit[axis] = 1.0;
+    along(unit);
+    for (std::size_t i = 0; i < 3; ++i) {
+      along(cross(unit, difference(corners[(i + 1) % 3], corners[i])));
+    }
+  }
+  along(cross(difference(corners[1], corners[0]), difference(corners[2], corners[0])));
+  return widest;
+}
+
+int determinant_sign(const Point& d, const Point& o, const Point& a, const Point& b) {
+  const Determinant filter = determinant(d, difference(a, o), difference(b, o));
+  if (filter.certain()) return (filter.value > 0.0) - (filter.value < 0.0);
+  const int exponent = common_exponent({o, a, b});
+  const IntegerPoint origin(o, exponent);
+  const IntegerPoint direction(d, common_exponent({d}));
+  return sgn(dot(direction,
+                 cross(IntegerPoint(a, exponent) - origin, IntegerPoint(b, exponent) - origin)));
+}
+
+PlaneHit plane_hit(const Point& o, const Point& d, const Corners& corners) {
+  const ExactPlaneHit exact(o, d, corners);
+  PlaneHit result{};
+  const int scale = 2 * exact.point_exponent;
+  const auto rounded = [](const mpz_class& value, int exponent) {
+    return nearest_double({value, 1, exponent});
+  };
+  result.normal = std::hypot(rounded(exact.normal.x, scale), rounded(exact.normal.y, scale),
+                             rounded(exact.normal.z, scale));
+  result.denominator = rounded(exact.along, scale + exact.direction_exponent);
+  result.t =
+      sgn(exact.along) == 0 ? std::numeric_limits<double>::quiet_NaN() : nearest_double(exact.t());
+  return result;
+}
+
+}  // namespace zkd::verify

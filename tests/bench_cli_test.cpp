@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// zkd-bench from the outside: exit status, one-line errors, JSON, and silence where it is due.
+// ZKD_BENCH_PATH is the program.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+std::string contents(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+std::size_t lines_of(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// A tetrahedron: closed, four triangles, vertices shared.
+constexpr const char* tetrahedron =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+class BenchCli : public testing::Test {
+ protected:
+  struct Outcome {
+    int status = -1;
+    std::string out;
+    std::string err;
+  };
+
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "zkd-bench-test-XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    write(folder_ / "tetra.obj", tetrahedron);
+  }
+  void TearDown() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  // Runs `zkd-bench arguments` in the test's folder. Standard output is read through a pipe.
+  Outcome run(const std::string& arguments, const std::string& environment = "") const {
+    const fs::path err = folder_ / "stderr";
+    const std::string command = "cd '" + folder_.string() + "' && " + environment +
+                                " exec '" ZKD_BENCH_PATH "' " + arguments + " 2>'" + err.string() +
+                                "'";
+    Outcome outcome;
+    FILE* const pipe = popen(command.c_str(), "r");
+    if (pipe == nullptr) return outcome;
+    char buffer[4096];
+    for (std::size_t read = 0; (read = std::fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
+      outcome.out.append(buffer, read);
+    }
+    const int status = pclose(pipe);
+    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    outcome.err = contents(err);
+    return outcome;
+  }
+
+  // Exit status as given, and exactly one line on stderr that says `naming`.
+  void expect_error(const std::string& arguments, int status, const std::string& naming) const {
+    SCOPED_TRACE(arguments);
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, status);
+    EXPECT_EQ(lines_of(outcome.err), 1u) << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("zkd-bench: error: ")) << outcome.err;
+    EXPECT_NE(outcome.err.find(naming), std::string::npos) << outcome.err;
+  }
+
+  Json run_json(const std::string& arguments) const {
+    const Outcome outcome = run(arguments + " --json -");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+    return Json::parse(outcome.out, nullptr, false);
+  }
+
+  static constexpr const char* quick = " --size 32 --repeat 2 --threads 2";
+  fs::path folder_;
+};
+
+void expect_keys(const Json& object, const std::vector<std::string>& keys) {
+  ASSERT_TRUE(object.is_object()) << object.dump();
+  for (const std::string& key : keys) EXPECT_TRUE(object.contains(key)) << key;
+}
+
+void expect_spread(const Json& spread, std::size_t n) {
+  expect_keys(spread, {"median", "min", "max", "n"});
+  EXPECT_EQ(spread["n"], n);
+  EXPECT_LE(spread["min"].get<double>(), spread["median"].get<double>());
+  EXPECT_LE(spread["median"].get<double>(), spread["max"].get<double>());
+}
+
+TEST_F(BenchCli, HelpVersionAndListSucceed) {
+  const Outcome help = run("--help");
+  EXPECT_EQ(help.status, 0);
+  for (const char* option :
+       {"--backend",   "--threads",   "--references", "--budget", "--builder", "--quality",
+        "--leaf-size", "--code-bits", "--axis-order", "--recode", "--invalid", "--instructions",
+        "--rays",      "--size",      "--repeat",     "--peers",  "--check",   "--json",
+        "--images",    "--list",      "--version",    "--seed"}) {
+    EXPECT_NE(help.out.find(option), std::string::npos) << option;
+  }
+  const Outcome version = run("--version");
+  EXPECT_EQ(version.status, 0);
+  EXPECT_TRUE(version.out.starts_with("zkd-bench ")) << version.out;
+  const Outcome list = run("--list");
+  EXPECT_EQ(list.status, 0);
+  EXPECT_NE(list.out.find("bunny"), std::string::npos);
+  EXPECT_EQ(help.err + version.err + list.err, "");
+}
+
+TEST_F(BenchCli, BadUsageIsOneLineThatNamesTheOption) {
+  expect_error("tetra.obj --no-such-option", 2, "--no-such-option");
+  expect_error("tetra.obj --references twice", 2, "--references");
+  expect_error("tetra.obj --references once,twice", 2, "twice");
+  expect_error("tetra.obj --builder lego", 2, "--builder");
+  expect_error("tetra.obj --quality low", 2, "--quality");
+  expect_error("tetra.obj --rays purple", 2, "--rays");
+  expect_error("tetra.obj --rays ''", 2, "--rays");
+  expect_error("tetra.obj --peers optix", 2, "--peers");
+  expect_error("tetra.obj --backend tpu", 2, "--backend");
+  expect_error("tetra.obj --axis-order zyx", 2, "--axis-order");
+  expect_error("tetra.obj --recode maybe", 2, "--recode");
+  expect_error("tetra.obj --invalid keep", 2, "--invalid");
+  expect_error("tetra.obj --instructions mmx", 2, "--instructions");
+  expect_error("tetra.obj --budget 0.5", 2, "--budget");
+  expect_error("tetra.obj --budget nan", 2, "--budget");
+  for (const char* option :
+       {"--threads", "--leaf-size", "--code-bits", "--size", "--repeat", "--check", "--seed"}) {
+    expect_error(std::string("tetra.obj ") + option + " -1", 2, option);
+    expect_error(std::string("tetra.obj ") + option + " 1.5", 2, option);
+    expect_error(std::string("tetra.obj ") + option + " x", 2, option);
+    expect_error(std::string("tetra.obj ") + option, 2, option);
+  }
+  expect_error("tetra.obj --leaf-size 0", 2, "--leaf-size");
+  expect_error("tetra.obj --code-bits 65", 2, "--code-bits");
+}
+
+TEST_F(BenchCli, BadInputIsOneLineThatNamesTheFile) {
+  expect_error("missing.obj", 2, "missing.obj");
+  expect_error("no-such-scene-name", 2, "no-such-scene-name");
+  write(folder_ / "empty.obj", "v 0 0 0\n");
+  expect_error("empty.obj", 2, "empty.obj");
+  write(folder_ / "broken.obj", "v 0 0 0\nv 1 0 0\nv 0 1 zz\nf 1 2 3\n");
+  expect_error("broken.obj", 2, "broken.obj:3");
+  write(folder_ / "outside.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+  expect_error("outside.obj", 2, "outside.obj:4");
+  expect_error("tetra.obj --json missing-folder/out.json", 2, "--json");
+  expect_error("tetra.obj --images tetra.obj/images", 2, "--images");
+}
+
+TEST_F(BenchCli, WhatThisVersionDoesNotBuildIsUsage) {
+  expect_error("tetra.obj --references budget", 2, "budget");
+  expect_error("tetra.obj --builder sah", 2, "sah");
+  expect_error("tetra.obj --quality high", 2, "high");
+}
+
+TEST_F(BenchCli, CudaWithoutCudaIsADeviceFailure) {
+  const Outcome outcome = run("tetra.obj --backend cuda" + std::string(quick));
+  if (outcome.status == 0) GTEST_SKIP() << "a CUDA device answers here";
+  EXPECT_EQ(outcome.status, 3);
+  EXPECT_EQ(lines_of(outcome.err), 1u) << outcome.err;
+  EXPECT_TRUE(outcome.err.starts_with("zkd-bench: error: ")) << outcome.err;
+}
+
+TEST_F(BenchCli, TableFitsAHundredColumnsAndStderrIsQuiet) {
+  const Outcome outcome = run("tetra.obj --references once,all --check 500" + std::string(quick));
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("tetra all"), std::string::npos) << outcome.out;
+  std::istringstream lines(outcome.out);
+  std::string line;
+  std::getline(lines, line);  // names the processor, however long that is
+  EXPECT_TRUE(line.starts_with("zkd-bench ")) << line;
+  while (std::getline(lines, line)) EXPECT_LE(line.size(), 100u) << line;
+}
+
+TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
+  const Json json = run_json("tetra.obj --references once,all --check 500" + std::string(quick));
+  expect_keys(json, {"schema", "zkd", "commit", "machine", "results"});
+  EXPECT_EQ(json["schema"], 1);
+  expect_keys(json["machine"], {"cpu", "threads", "gpu", "driver", "compiler"});
+  EXPECT_EQ(json["machine"]["threads"], 2);
+  ASSERT_EQ(json["results"].size(), 2u);
+  EXPECT_EQ(json["results"][0]["options"]["references"], "once");
+  EXPECT_EQ(json["results"][1]["options"]["references"], "all");
+  for (const Json& result : json["results"]) {
+    expect_keys(result, {"scene", "triangles", "stand_in", "skipped_triangles", "backend",
+                         "threads", "options", "build_ms", "stages_ms", "allocated_bytes", "tree",
+                         "trace", "check", "skipped", "peers"});
+    EXPECT_EQ(result["scene"], "tetra");
+    EXPECT_EQ(result["triangles"], 4);
+    EXPECT_EQ(result["stand_in"], false);
+    EXPECT_EQ(result["skipped_triangles"], 0);
+    EXPECT_EQ(result["backend"], "cpu");
+    EXPECT_EQ(result["threads"], 2);
+    expect_keys(result["options"],
+                {"builder", "quality", "references", "budget", "leaf_size", "code_bits",
+                 "axis_order", "recode", "invalid", "instructions", "seed"});
+    expect_spread(result["build_ms"], 2);
+    expect_keys(result["stages_ms"], {"validate", "encode", "sort", "references", "tight_boxes"});
+    expect_keys(result["allocated_bytes"], {"tree", "workspace", "asked_beforehand"});
+    EXPECT_LE(result["allocated_bytes"]["tree"].get<std::uint64_t>() +
+                  result["allocated_bytes"]["workspace"].get<std::uint64_t>(),
+              result["allocated_bytes"]["asked_beforehand"].get<std::uint64_t>());
+    expect_keys(result["tree"], {"nodes", "leaves", "references", "depth", "sah", "hash"});
+    EXPECT_EQ(result["tree"]["hash"].get<std::string>().size(), 32u);
+    expect_keys(result["trace"], {"primary", "diffuse", "shadow"});
+    for (const char* kind : {"primary", "diffuse", "shadow"}) {
+      const Json& trace = result["trace"][kind];
+      expect_keys(trace, {"rays", "hits", "ms", "mrays_per_s", "node_visits_per_ray",
+                          "triangle_tests_per_ray"});
+      expect_spread(trace["ms"], 2);
+    }
+    EXPECT_EQ(result["trace"]["primary"]["rays"], 32 * 32);
+    EXPECT_EQ(result["trace"]["diffuse"]["rays"], result["trace"]["primary"]["hits"]);
+    EXPECT_EQ(result["trace"]["shadow"]["rays"], result["trace"]["primary"]["hits"]);
+    // A tetrahedron is convex: nothing bounces back onto it.
+    EXPECT_EQ(result["trace"]["diffuse"]["hits"], 0);
+    expect_keys(result["check"],
+                {"rays", "missed", "phantom", "wrong_triangle", "in_band", "t_ulp_p999", "leaks"});
+    expect_keys(result["check"]["in_band"], {"missed", "phantom", "wrong_triangle"});
+    EXPECT_EQ(result["check"]["rays"], 3 * 500);
+    EXPECT_EQ(result["check"]["missed"], 0);
+    EXPECT_EQ(result["check"]["phantom"], 0);
+    EXPECT_EQ(result["check"]["wrong_triangle"], 0);
+    EXPECT_EQ(result["check"]["leaks"], 0);
+    EXPECT_TRUE(result["peers"].empty());
+    for (const Json& skipped : result["skipped"]) {
+      expect_keys(skipped, {"what", "why", "saved_ms"});
+    }
+  }
+}
+
+TEST_F(BenchCli, RaysNotAskedForAreNull) {
+  const Json json = run_json("tetra.obj --rays diffuse --check 100" + std::string(quick));
+  const Json& trace = json["results"][0]["trace"];
+  EXPECT_TRUE(trace["primary"].is_null());
+  EXPECT_TRUE(trace["shadow"].is_null());
+  EXPECT_GT(trace["diffuse"]["rays"], 0);
+  EXPECT_EQ(json["results"][0]["check"]["rays"], 100);
+}
+
+TEST_F(BenchCli, OpenMeshHasNoLeaksToCount) {
+  write(folder_ / "open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const Json json = run_json("open.obj --check 100" + std::string(quick));
+  EXPECT_TRUE(json["results"][0]["check"]["leaks"].is_null());
+}
+
+TEST_F(BenchCli, EveryBuildOptionIsPassedOnAndRecorded) {
+  const Json json = run_json(
+      "tetra.obj --leaf-size 2 --code-bits 24 --axis-order cyclic"
+      " --recode off --invalid skip --instructions portable --budget 1.5" +
+      std::string(quick));
+  const Json& options = json["results"][0]["options"];
+  EXPECT_EQ(options["leaf_size"], 2);
+  EXPECT_EQ(options["axis_order"], "cyclic");
+  EXPECT_EQ(options["recode"], false);
+  EXPECT_EQ(options["invalid"], "skip");
+  EXPECT_EQ(options["instructions"], "portable");
+  EXPECT_EQ(options["budget"], 1.5);
+  EXPECT_LE(options["code_bits"], 24);
+}
+
+TEST_F(BenchCli, SameTreeAndSameRaysOnAnyNumberOfThreads) {
+  const Json one = run_json("tetra.obj --size 32 --repeat 1 --threads 1");
+  const Json three = run_json("tetra.obj --size 32 --repeat 1 --threads 3");
+  EXPECT_EQ(one["results"][0]["tree"]["hash"], three["results"][0]["tree"]["hash"]);
+  for (const char* kind : {"primary", "diffuse", "shadow"}) {
+    EXPECT_EQ(one["results"][0]["trace"][kind]["hits"], three["results"][0]["trace"][kind]["hits"]);
+  }
+}
+
+TEST_F(BenchCli, WorksFromAnyFolderAndWritesWhereAsked) {
+  fs::create_directory(folder_ / "elsewhere");
+  const Outcome outcome =
+      run("'" + (folder_ / "tetra.obj").string() + "' --json '" +
+              (folder_ / "elsewhere/out.json").string() + "' --images elsewhere/images" + quick,
+          "cd / && cd \"$OLDPWD\" &&");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("tetra"), std::string::npos);
+  const Json json = Json::parse(contents(folder_ / "elsewhere/out.json"), nullptr, false);
+  EXPECT_EQ(json["results"].size(), 1u);
+  for (const char* image : {"tetra-shaded.png", "tetra-depth.png", "tetra-visits.png"}) {
+    const std::string png = contents(folder_ / "elsewhere/images" / image);
+    EXPECT_TRUE(png.starts_with("\x89PNG")) << image;
+  }
+}
+
+TEST_F(BenchCli, EmbreeIsTimedOnTheSameRays) {
+  const Outcome outcome = run("tetra.obj --peers embree --json -" + std::string(quick));
+  if (outcome.status == 2 && outcome.err.find("without Embree") != std::string::npos) {
+    GTEST_SKIP() << outcome.err;
+  }
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const Json json = Json::parse(outcome.out, nullptr, false);
+  const Json& result = json["results"][0];
+  std::vector<std::string> settings;
+  for (const Json& peer : result["peers"]) {
+    const std::string name = peer["name"];
+    EXPECT_TRUE(name.starts_with("embree-")) << name;
+    settings.push_back(name.substr(name.find(' ') + 1));
+    expect_spread(peer["build_ms"], 2);
+    EXPECT_EQ(peer["trace"]["primary"]["rays"], 32 * 32);
+    expect_spread(peer["trace"]["shadow"]["ms"], 2);
+  }
+  for (const char* wanted : {"low", "medium", "high", "low robust", "medium robust", "high robust",
+                             "medium packet8", "high robust packet8"}) {
+    EXPECT_NE(std::find(settings.begin(), settings.end(), wanted), settings.end()) << wanted;
+  }
+}
+
+}  // namespace

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The tree never changes an answer: every query against a loop over all triangles, bit for bit, on
+// many small meshes and every kind of ray.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <zkd/zkd.hpp>
+
+#include "support/hits.hpp"
+#include "support/meshes.hpp"
+#include "support/rays.hpp"
+
+namespace zkd {
+namespace {
+
+using test::or_miss;
+using test::print;
+using test::same_bits;
+
+struct Count {
+  std::uint64_t rays = 0;
+  std::uint64_t hits = 0;
+};
+
+// Every form of a query, on both instruction sets, against brute force.
+void expect_same_answers(const Tree& tree, const TriangleView& triangles,
+                         const std::vector<Ray>& rays, Count& count) {
+  const std::vector<Hit> want =
+      test::brute_force(tree.view(), triangles, rays,
+                        {.threads = 1, .instructions = cpu::InstructionSet::portable});
+  count.rays += rays.size();
+  for (const auto set : {cpu::InstructionSet::portable, cpu::InstructionSet::avx2}) {
+    const cpu::Executor executor{.threads = 2, .instructions = set};
+    const std::vector<Hit> loop = test::brute_force(tree.view(), triangles, rays, executor);
+    std::vector<TraversalCost> costs(rays.size());
+    std::vector<Hit> hits(rays.size());
+    closest_hit(executor, tree.view(), triangles, rays, hits, costs);
+    std::vector<std::uint8_t> occluded(rays.size(), 7);
+    any_hit(executor, tree.view(), triangles, rays, occluded);
+    const char* name = set == cpu::InstructionSet::avx2 ? "avx2" : "portable";
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      ASSERT_TRUE(same_bits(loop[i], want[i]))
+          << "brute force itself, " << name << ", ray " << i << " " << print(rays[i]) << ": "
+          << print(loop[i]) << " instead of " << print(want[i]);
+      ASSERT_TRUE(same_bits(hits[i], want[i]))
+          << name << ", ray " << i << " " << print(rays[i]) << ": " << print(hits[i])
+          << " instead of " << print(want[i]);
+      ASSERT_EQ(occluded[i], test::is_hit(want[i]) ? 1 : 0)
+          << name << ", any hit, ray " << i << " " << print(rays[i]);
+      ASSERT_TRUE(!test::is_hit(want[i]) || costs[i].triangle_tests > 0);
+    }
+  }
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Hit hit = or_miss(closest_hit(tree.view(), triangles, rays[i]));
+    ASSERT_TRUE(same_bits(hit, want[i])) << "single ray " << i << " " << print(rays[i]) << ": "
+                                         << print(hit) << " instead of " << print(want[i]);
+    ASSERT_EQ(any_hit(tree.view(), triangles, rays[i]), test::is_hit(want[i]))
+        << "single any hit, ray " << i << " " << print(rays[i]);
+    count.hits += test::is_hit(want[i]) ? 1 : 0;
+  }
+}
+
+BuildOptions options_for(References references, std::uint64_t seed) {
+  BuildOptions options;
+  options.references = references;
+  options.leaf_size = seed % 3 == 0 ? 1 : seed % 3 == 1 ? 4 : 9;
+  options.code_bits = seed % 4 == 0 ? 64 : seed % 4 == 1 ? 12 : 0;
+  options.invalid_triangles = InvalidTriangles::skip;
+  return options;
+}
+
+class QueryBruteForce : public testing::TestWithParam<int> {};
+
+TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
+  Count count;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const test::NamedMesh m = test::small_mesh(GetParam(), seed);
+    for (const References references : {References::once, References::all}) {
+      SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references));
+      const Tree tree = build(m.mesh.view(), options_for(references, seed));
+      test::RayMaker maker(m.mesh, tree.view(), seed);
+      std::vector<Ray> rays = maker.all_kinds(720);
+      for (const std::vector<Ray>& more :
+           {scene::random_rays(tree.view().bounds, 100, seed),
+            scene::rays_at_features(m.mesh, 100, seed), scene::axis_rays(m.mesh, 100, seed)}) {
+        rays.insert(rays.end(), more.begin(), more.end());
+      }
+      expect_same_answers(tree, m.mesh.view(), rays, count);
+      if (testing::Test::HasFatalFailure()) return;
+    }
+  }
+  RecordProperty("rays", std::to_string(count.rays));
+  RecordProperty("hits", std::to_string(count.hits));
+}
+
+// Rays whose ends are at a hit exactly, or an ulp beside it.
+TEST_P(QueryBruteForce, EndsOfTheIntervalAtTheHit) {
+  Count count;
+  const test::NamedMesh m = test::small_mesh(GetParam(), 50);
+  for (const References references : {References::once, References::all}) {
+    SCOPED_TRACE(m.name + ", " + to_string(references));
+    const Tree tree = build(m.mesh.view(), options_for(references, 50));
+    std::vector<Ray> rays;
+    for (Ray ray : test::RayMaker(m.mesh, tree.view(), 50).all_kinds(400)) {
+      const auto hit = closest_hit(tree.view(), m.mesh.view(), ray);
+      if (!hit) continue;
+      for (int end = 0; end < 2; ++end) {
+        for (int step = -1; step <= 1; ++step) {
+          Ray cut = ray;
+          (end == 0 ? cut.t_min : cut.t_max) = test::ulps(hit->t, step);
+          rays.push_back(cut);
+        }
+      }
+      ray.t_min = ray.t_max = hit->t;
+      rays.push_back(ray);
+    }
+    expect_same_answers(tree, m.mesh.view(), rays, count);
+    if (testing::Test::HasFatalFailure()) return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, QueryBruteForce, testing::Range(0, test::small_mesh_kinds),
+                         [](const auto& kind) {
+                           std::string name = test::small_mesh(kind.param, 1).name;
+                           for (char& c : name) {
+                             if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+                           }
+                           return name;
+                         });
+
+TEST(QueryBruteForce, LargerScenes) {
+  Count count;
+  for (const References references : {References::once, References::all}) {
+    for (const scene::Mesh& mesh : {scene::soup(5000, 60), scene::sphere(4), scene::grid(7),
+                                    scene::small_in_large(3000, 1e6F, 60), scene::fan(5000)}) {
+      const Tree tree = build(mesh.view(), {.references = references});
+      expect_same_answers(tree, mesh.view(),
+                          test::RayMaker(mesh, tree.view(), 61).all_kinds(480), count);
+      if (testing::Test::HasFatalFailure()) return;
+    }
+  }
+  EXPECT_GT(count.hits, count.rays / 4) << "the rays miss too often to say much";
+}
+
+}  // namespace
+}  // namespace zkd
