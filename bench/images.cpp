@@ -29,11 +29,11 @@ double percentile(std::vector<double> values, double share) {
 // One sample a ray: clay under one light with a hard shadow, some sky, and a paler backdrop.
 Pixels shade(const TriangleView& triangles, const Tree& tree, const scene::Camera& camera,
              const std::vector<Ray>& rays, const cpu::Executor& executor) {
-  constexpr glm::vec3 clay(0.62F, 0.58F, 0.53F);
-  constexpr glm::vec3 backdrop(0.90F, 0.92F, 0.95F);
-  constexpr float sky = 0.30F;
-  constexpr float from_eye = 0.20F;
-  constexpr float from_light = 0.75F;
+  constexpr glm::vec3 clay(0.50F, 0.43F, 0.36F);
+  constexpr glm::vec3 backdrop(0.80F, 0.84F, 0.89F);
+  constexpr float sky = 0.22F;
+  constexpr float from_eye = 0.08F;
+  constexpr float from_light = 0.90F;
 
   std::vector<Hit> hits(rays.size());
   closest_hit(executor, tree.view(), triangles, rays, hits);

@@ -126,8 +126,9 @@ void print_footnotes(std::ostream& out, const std::vector<Result>& results) {
   for (const Result& result : results) {
     std::string line;
     if (result.stand_in) {
-      line = "* " + result.scene + " is a stand-in";
-      if (!result.note.empty()) line += ": " + result.note;
+      line = "* " + result.scene + ": ";
+      if (result.note.find("stand-in") == std::string::npos) line += "stand-in, ";
+      line += result.note.empty() ? "not the mesh of the paper" : result.note;
     } else if (result.paper_triangles != 0 && result.paper_triangles != result.triangles) {
       line = result.scene + ": the paper has " + count(result.paper_triangles) +
              " triangles, this mesh " + count(result.triangles);
@@ -188,25 +189,33 @@ void print_stages(std::ostream& out, const std::vector<Result>& results) {
   }
 }
 
+// `lead` and a list with commas, broken so that no line is longer than a table.
+void print_list(std::ostream& out, const std::string& lead, std::size_t indent,
+                const std::vector<std::string>& items) {
+  constexpr std::size_t columns = 100;
+  std::string line = lead;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    std::string item = items[i];
+    if (i + 1 < items.size()) item += ',';
+    if (line.size() + 1 + item.size() > columns) {
+      out << line << '\n';
+      line = left("", indent);
+    }
+    line.append(1, ' ').append(item);
+  }
+  out << line << '\n';
+}
+
 void print_skips(std::ostream& out, const std::vector<Result>& results) {
   out << "\nSkipped, because the scene did not need it\n";
   for (const Result& result : results) {
-    const std::vector<SkippedWork> list = skipped_work(result.statistics);
-    std::string line = left(label_of(result), label_width) + " ";
-    if (list.empty()) line += "nothing";
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      std::string entry = list[i].what;
-      std::replace(entry.begin(), entry.end(), '_', ' ');
-      if (!list[i].amount.empty()) entry += " (" + list[i].amount + ")";
-      if (i + 1 < list.size()) entry += ",";
-      if (line.size() + 1 + entry.size() > 99) {
-        out << line << '\n';
-        line = left("", label_width + 1);
-      }
-      if (line.back() != ' ') line += ' ';
-      line += entry;
+    std::vector<std::string> items;
+    for (const SkippedWork& work : skipped_work(result.statistics)) {
+      items.push_back(work.what);
+      if (!work.amount.empty()) items.back().append(" (").append(work.amount).append(")");
     }
-    out << line << '\n';
+    if (items.empty()) items.push_back("nothing");
+    print_list(out, left(label_of(result), label_width), label_width, items);
   }
 }
 
@@ -317,15 +326,14 @@ void print_check(std::ostream& out, const std::vector<Result>& results) {
 }
 
 void print_images(std::ostream& out, const Options& options, const std::vector<Result>& results) {
-  out << "\nImages in " << options.images->string() << "; node visits of a primary ray from 0 "
-      << "(black) to white at:";
-  const char* separator = " ";
+  out << "\nImages in " << options.images->string() << '\n';
+  std::vector<std::string> items;
   for (const Result& result : results) {
-    if (!result.visits_at_white) continue;
-    out << separator << label_of(result) << " " << number(result.visits_at_white);
-    separator = ", ";
+    if (result.visits_at_white) {
+      items.push_back(label_of(result) + " " + number(result.visits_at_white));
+    }
   }
-  out << '\n';
+  print_list(out, "node visits of a primary ray, from 0 (black) to the palest at", 0, items);
 }
 
 }  // namespace

@@ -29,9 +29,8 @@ struct Count {
 // Every form of a query, on both instruction sets, against brute force.
 void expect_same_answers(const Tree& tree, const TriangleView& triangles,
                          const std::vector<Ray>& rays, Count& count) {
-  const std::vector<Hit> want =
-      test::brute_force(tree.view(), triangles, rays,
-                        {.threads = 1, .instructions = cpu::InstructionSet::portable});
+  const std::vector<Hit> want = test::brute_force(
+      tree.view(), triangles, rays, {.threads = 1, .instructions = cpu::InstructionSet::portable});
   count.rays += rays.size();
   for (const auto set : {cpu::InstructionSet::portable, cpu::InstructionSet::avx2}) {
     const cpu::Executor executor{.threads = 2, .instructions = set};
@@ -138,8 +137,8 @@ TEST(QueryBruteForce, LargerScenes) {
     for (const scene::Mesh& mesh : {scene::soup(5000, 60), scene::sphere(4), scene::grid(7),
                                     scene::small_in_large(3000, 1e6F, 60), scene::fan(5000)}) {
       const Tree tree = build(mesh.view(), {.references = references});
-      expect_same_answers(tree, mesh.view(),
-                          test::RayMaker(mesh, tree.view(), 61).all_kinds(480), count);
+      expect_same_answers(tree, mesh.view(), test::RayMaker(mesh, tree.view(), 61).all_kinds(480),
+                          count);
       if (testing::Test::HasFatalFailure()) return;
     }
   }

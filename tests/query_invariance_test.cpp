@@ -53,12 +53,12 @@ TEST(QueryInvariance, ScalingTheSceneByPowersOfTwo) {
       const std::vector<Hit> want = test::closest(at_one.view(), m.mesh.view(), rays);
       for (const int e : {-100, -60, -33, -20, -3, 1, 17, 30, 45, 100}) {
         const scene::Mesh scaled = scene::scaled(m.mesh, e);
-        const bool exact = std::equal(
-            scaled.positions.begin(), scaled.positions.end(), m.mesh.positions.begin(),
-            [e](const glm::vec3& a, const glm::vec3& b) {
-              return std::ldexp(a.x, -e) == b.x && std::ldexp(a.y, -e) == b.y &&
-                     std::ldexp(a.z, -e) == b.z;
-            });
+        const bool exact =
+            std::equal(scaled.positions.begin(), scaled.positions.end(), m.mesh.positions.begin(),
+                       [e](const glm::vec3& a, const glm::vec3& b) {
+                         return std::ldexp(a.x, -e) == b.x && std::ldexp(a.y, -e) == b.y &&
+                                std::ldexp(a.z, -e) == b.z;
+                       });
         if (!exact) continue;  // the input itself underflows or overflows
         const Tree tree = build(scaled.view(), options_for(references));
         ASSERT_EQ(tree.view().leaf_count, at_one.view().leaf_count);
@@ -222,8 +222,9 @@ TEST(QueryInvariance, RoundingModeOfTheCaller) {
       const int after = std::fegetround();
       std::fesetround(FE_TONEAREST);
       EXPECT_EQ(after, mode) << "the mode was not put back";
-      expect_equal(got, c.want,
-                   c.named.name + ", " + to_string(c.references) + ", mode " + std::to_string(mode));
+      expect_equal(
+          got, c.want,
+          c.named.name + ", " + to_string(c.references) + ", mode " + std::to_string(mode));
     }
   }
 }

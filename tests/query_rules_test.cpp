@@ -29,9 +29,9 @@ constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 class QueryRules : public testing::TestWithParam<References> {
  protected:
   [[nodiscard]] static Tree tree_of(const TriangleView& triangles) {
-    return build(triangles, {.references = GetParam(),
-                             .leaf_size = 1,
-                             .invalid_triangles = InvalidTriangles::skip});
+    return build(
+        triangles,
+        {.references = GetParam(), .leaf_size = 1, .invalid_triangles = InvalidTriangles::skip});
   }
 
   static Hit shoot(const Tree& tree, const TriangleView& triangles, const Ray& ray) {
@@ -102,8 +102,8 @@ TEST_P(QueryRules, OriginOnASurfaceHitsAtZero) {
   const Hit at = shoot(tree, view, {{0.25F, 0.5F, 2}, 0, {0, 0, 1}, infinity});
   EXPECT_EQ(at.triangle, 1u);
   EXPECT_EQ(at.t, 0.0F);
-  const Hit next = shoot(tree, view,
-                         {{0.25F, 0.5F, 2}, std::numeric_limits<float>::denorm_min(), {0, 0, 1}});
+  const Hit next =
+      shoot(tree, view, {{0.25F, 0.5F, 2}, std::numeric_limits<float>::denorm_min(), {0, 0, 1}});
   EXPECT_EQ(next.triangle, 2u);
 }
 
@@ -116,10 +116,11 @@ TEST_P(QueryRules, BothSidesAndTheBoundaryAreHit) {
   const struct {
     float x, y, u, v;
     bool hit;
-  } points[] = {{1, 1, 0.25F, 0.25F, true},  {0, 0, 0, 0, true},       {4, 0, 1, 0, true},
-                {0, 4, 0, 1, true},          {2, 0, 0.5F, 0, true},    {0, 2, 0, 0.5F, true},
-                {2, 2, 0.5F, 0.5F, true},    {-0x1p-20F, 1, 0, 0, false},
-                {1, -0x1p-20F, 0, 0, false}, {2.001F, 2, 0, 0, false}, {5, 0, 0, 0, false}};
+  } points[] = {
+      {1, 1, 0.25F, 0.25F, true}, {0, 0, 0, 0, true},          {4, 0, 1, 0, true},
+      {0, 4, 0, 1, true},         {2, 0, 0.5F, 0, true},       {0, 2, 0, 0.5F, true},
+      {2, 2, 0.5F, 0.5F, true},   {-0x1p-20F, 1, 0, 0, false}, {1, -0x1p-20F, 0, 0, false},
+      {2.001F, 2, 0, 0, false},   {5, 0, 0, 0, false}};
   for (const auto& p : points) {
     for (const float side : {1.0F, -1.0F}) {
       const Ray ray{{p.x, p.y, 1 - side}, 0, {0, 0, side}, infinity};
@@ -199,8 +200,7 @@ TEST_P(QueryRules, SharedVertexBelongsToTheLowestId) {
         const std::vector<glm::vec3> alone = {mesh.positions[f.x], mesh.positions[f.y],
                                               mesh.positions[f.z]};
         const std::vector<Ray> rays = {ray};
-        const Hit other =
-            test::brute_force(tree.view(), TriangleView{std::span(alone)}, rays)[0];
+        const Hit other = test::brute_force(tree.view(), TriangleView{std::span(alone)}, rays)[0];
         ASSERT_GT(other.t, hit.t) << "triangle " << id << " ties with " << hit.triangle;
       }
     }
@@ -246,7 +246,8 @@ TEST_P(QueryRules, DegenerateRaysMiss) {
 
 TEST_P(QueryRules, CoplanarRaysMiss) {
   for (int axis = 0; axis < 3; ++axis) {
-    std::vector<glm::vec3> corners = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}, {4, 0, 0}, {0, 4, 0}};
+    std::vector<glm::vec3> corners = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0},
+                                      {4, 4, 0}, {4, 0, 0}, {0, 4, 0}};
     for (glm::vec3& p : corners) {
       glm::vec3 q;
       q[axis] = 2.0F;
@@ -272,11 +273,11 @@ TEST_P(QueryRules, CoplanarRaysMiss) {
 
 TEST_P(QueryRules, LeftOutTrianglesAreNeverHit) {
   const std::vector<glm::vec3> corners = {
-      {0, 0, 1}, {4, 0, 1}, {8, 0, 1},                      // a line
-      {0, 0, 2}, {0, 0, 2}, {0, 4, 2},                      // two corners alike
-      {nan_value, 0, 3}, {4, 0, 3}, {0, 4, 3},              // no number
-      {-8, -8, 4}, {infinity, -8, 4}, {0, 8, 4},            // no end
-      {-8, -8, 5}, {8, -8, 5}, {0, 8, 5}};                  // a triangle
+      {0, 0, 1},         {4, 0, 1},         {8, 0, 1},   // a line
+      {0, 0, 2},         {0, 0, 2},         {0, 4, 2},   // two corners alike
+      {nan_value, 0, 3}, {4, 0, 3},         {0, 4, 3},   // no number
+      {-8, -8, 4},       {infinity, -8, 4}, {0, 8, 4},   // no end
+      {-8, -8, 5},       {8, -8, 5},        {0, 8, 5}};  // a triangle
   const TriangleView view{std::span(corners)};
   const Tree tree = tree_of(view);
   for (int i = 0; i <= 16; ++i) {
@@ -301,9 +302,8 @@ TEST_P(QueryRules, TScalesExactlyWithPowersOfTwoOfTheDirection) {
       Hit want = one;
       want.t = std::ldexp(one.t, -e);
       const Hit scaled = or_miss(closest_hit(tree.view(), view, ray));
-      ASSERT_TRUE(same_bits(scaled, want))
-          << "2^" << e << ": " << print(scaled) << " instead of " << print(want) << ", "
-          << print(ray);
+      ASSERT_TRUE(same_bits(scaled, want)) << "2^" << e << ": " << print(scaled) << " instead of "
+                                           << print(want) << ", " << print(ray);
     }
   }
   EXPECT_GT(hits, 250);

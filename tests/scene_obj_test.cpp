@@ -262,8 +262,8 @@ INSTANTIATE_TEST_SUITE_P(
                             2880,
                             {-149.29086303710938F, -66.8590087890625F, -167.22898864746094F},
                             {21.443805694580078F, 66.8602294921875F, 14.094596862792969F}}),
-    [](const auto& info) {
-      const std::string name = info.param.name;
+    [](const auto& parameter) {
+      const std::string name = parameter.param.name;
       return name.substr(0, name.find('.'));
     });
 

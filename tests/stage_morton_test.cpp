@@ -167,9 +167,10 @@ TEST(StageMorton, EmptyBoxesAreLeftOut) {
 TEST(StageMorton, ExtremeCoordinates) {
   Random random(27);
   constexpr float max_float = std::numeric_limits<float>::max();
-  std::vector<Box> boxes = {{{-max_float, -max_float, -max_float}, {max_float, max_float, max_float}},
-                            {{max_float, max_float, max_float}, {max_float, max_float, max_float}},
-                            {{-max_float, 0, 0}, {-max_float, 0, 0}}};
+  std::vector<Box> boxes = {
+      {{-max_float, -max_float, -max_float}, {max_float, max_float, max_float}},
+      {{max_float, max_float, max_float}, {max_float, max_float, max_float}},
+      {{-max_float, 0, 0}, {-max_float, 0, 0}}};
   for (int i = 0; i < 500; ++i) {
     Box box;
     for (int a = 0; a < 3; ++a) {

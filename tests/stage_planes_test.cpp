@@ -33,8 +33,8 @@ Trunks random_trunks(std::uint64_t seed, const Box& scene, std::uint32_t code_bi
   Random random(seed);
   Trunks out;
   out.lattice = stages::make_lattice(scene, code_bits, order);
-  test::Keys keys = test::without_duplicates(
-      test::random_keys(seed, 300, out.lattice.code_bits, 0, 200));
+  test::Keys keys =
+      test::without_duplicates(test::random_keys(seed, 300, out.lattice.code_bits, 0, 200));
   for (const stages::TrunkKey& key : keys) {
     if (random.one_in(2)) {
       out.keys.push_back(key);
@@ -124,7 +124,8 @@ TEST(StagePlanes, SeparateTheCellsOfTheirNeighbours) {
     const auto corner = [&](const stages::TrunkKey& key) {
       std::int64_t cell = 0;
       for (std::uint32_t level = 0; level < in.lattice.code_bits; ++level) {
-        if (in.lattice.axis[level] == axes[j]) cell = cell * 2 + (test::key_bit(key, level) ? 1 : 0);
+        if (in.lattice.axis[level] == axes[j])
+          cell = cell * 2 + (test::key_bit(key, level) ? 1 : 0);
       }
       return test::lattice_plane(in.lattice, static_cast<int>(axes[j]), cell);
     };
@@ -137,9 +138,9 @@ TEST(StagePlanes, LengthsThatDisagreeAreRefused) {
   const Trunks in = random_trunks(98, {{-1, -1, -1}, {1, 1, 1}}, 32, AxisOrder::by_extent);
   std::vector<std::uint32_t> axes(in.levels.size() - 1);
   std::vector<float> planes(in.levels.size());
-  EXPECT_THROW(stages::split_planes({}, in.keys, in.levels, in.crowd, in.lattice, in.lattices,
-                                    axes, planes),
-               Error);
+  EXPECT_THROW(
+      stages::split_planes({}, in.keys, in.levels, in.crowd, in.lattice, in.lattices, axes, planes),
+      Error);
 }
 
 }  // namespace

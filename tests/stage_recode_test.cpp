@@ -247,8 +247,8 @@ TEST(StageRecode, DisabledMakesKeysAndNothingElse) {
   EXPECT_EQ(got.ids, in.ids);
   for (std::size_t i = 0; i < in.ids.size(); ++i) {
     ASSERT_EQ(got.crowd[i], stages::no_crowd);
-    ASSERT_TRUE((got.keys[i] ==
-                 stages::TrunkKey{left_aligned(in.codes[i], in.lattice.code_bits), 0}));
+    ASSERT_TRUE(
+        (got.keys[i] == stages::TrunkKey{left_aligned(in.codes[i], in.lattice.code_bits), 0}));
   }
 }
 

@@ -41,8 +41,10 @@ Validated validate(const TriangleView& view, InvalidTriangles policy = InvalidTr
 
 bool same_bits(const Box& a, const Box& b) {
   for (int i = 0; i < 3; ++i) {
-    if (std::bit_cast<std::uint32_t>(a.lo[i]) != std::bit_cast<std::uint32_t>(b.lo[i])) return false;
-    if (std::bit_cast<std::uint32_t>(a.hi[i]) != std::bit_cast<std::uint32_t>(b.hi[i])) return false;
+    if (std::bit_cast<std::uint32_t>(a.lo[i]) != std::bit_cast<std::uint32_t>(b.lo[i]))
+      return false;
+    if (std::bit_cast<std::uint32_t>(a.hi[i]) != std::bit_cast<std::uint32_t>(b.hi[i]))
+      return false;
   }
   return true;
 }
@@ -190,8 +192,7 @@ TEST(StageValidate, SliverWhoseFloatCrossProductVanishesIsValid) {
   EXPECT_EQ(validate(TriangleView{std::span(small)}).summary.valid, 1u);
 
   // Edges that overflow float.
-  const std::vector<glm::vec3> large = {
-      {-max_float, 0, 0}, {max_float, 0, 0}, {0, tiny, 0}};
+  const std::vector<glm::vec3> large = {{-max_float, 0, 0}, {max_float, 0, 0}, {0, tiny, 0}};
   EXPECT_EQ(validate(TriangleView{std::span(large)}).summary.valid, 1u);
   const std::vector<glm::vec3> line = {
       {-max_float, -max_float, 1}, {max_float, max_float, 1}, {tiny, tiny, 1}};
@@ -208,8 +209,12 @@ TEST(StageValidate, AnyFiniteBits) {
   for (glm::vec3& p : corners) p = {random.any_finite(), random.any_finite(), random.any_finite()};
   for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
     switch (random.below(6)) {
-      case 0: corners[i + 1] = corners[i]; break;
-      case 1: corners[i + 2] = corners[i + 1]; break;
+      case 0:
+        corners[i + 1] = corners[i];
+        break;
+      case 1:
+        corners[i + 2] = corners[i + 1];
+        break;
       case 2:  // along an axis: collinear
         corners[i + 1] = {corners[i].x, corners[i].y, corners[i + 1].z};
         corners[i + 2] = {corners[i].x, corners[i].y, corners[i + 2].z};
@@ -219,7 +224,8 @@ TEST(StageValidate, AnyFiniteBits) {
         corners[i + 1] *= 0.25F;
         corners[i + 2] = 2.0F * corners[i + 1];
         break;
-      default: break;
+      default:
+        break;
     }
   }
   expect_as_defined(corners);

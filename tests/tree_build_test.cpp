@@ -59,9 +59,9 @@ Composition compose(const TriangleView& triangles, const BuildOptions& options) 
   std::vector<stages::TrunkKey> keys(scene.valid);
   std::vector<std::uint32_t> crowd(scene.valid);
   std::vector<Lattice> lattices(scene.valid);
-  out.crowded = stages::recode_crowded(executor, out.boxes, out.lattice, codes, out.ids,
-                                       options.leaf_size, options.axis_order,
-                                       options.recode_crowded, keys, crowd, lattices);
+  out.crowded =
+      stages::recode_crowded(executor, out.boxes, out.lattice, codes, out.ids, options.leaf_size,
+                             options.axis_order, options.recode_crowded, keys, crowd, lattices);
   out.first.resize(scene.valid);
   out.first.resize(stages::find_trunks(executor, keys, options.leaf_size, out.first));
 
@@ -132,12 +132,11 @@ TEST(TreeBuild, GivesTheBytesOfTheStages) {
             SCOPED_TRACE(m.name + ", " + std::to_string(code_bits) + " bits, leaf size " +
                          std::to_string(leaf_size) + ", " + to_string(order) +
                          (recode ? "" : ", not coded again"));
-            expect_equals_composition(m.mesh.view(),
-                                      {.leaf_size = leaf_size,
-                                       .code_bits = code_bits,
-                                       .axis_order = order,
-                                       .recode_crowded = recode,
-                                       .invalid_triangles = InvalidTriangles::skip});
+            expect_equals_composition(m.mesh.view(), {.leaf_size = leaf_size,
+                                                      .code_bits = code_bits,
+                                                      .axis_order = order,
+                                                      .recode_crowded = recode,
+                                                      .invalid_triangles = InvalidTriangles::skip});
             if (testing::Test::HasFailure()) return;
           }
         }
@@ -197,9 +196,8 @@ INSTANTIATE_TEST_SUITE_P(Every, TreeProperties, testing::Range(0, test::small_me
 
 TEST(TreeBuild, LargerScenesKeepTheirProperties) {
   for (const References references : {References::once, References::all}) {
-    for (const scene::Mesh& mesh :
-         {scene::soup(20000, 3), scene::sphere(5), scene::small_in_large(5000, 1e3F, 3),
-          scene::grid(10)}) {
+    for (const scene::Mesh& mesh : {scene::soup(20000, 3), scene::sphere(5),
+                                    scene::small_in_large(5000, 1e3F, 3), scene::grid(10)}) {
       const Tree tree = build(mesh.view(), {.references = references});
       for (const std::string& violation : verify::check_tree(tree, mesh.view())) {
         ADD_FAILURE() << to_string(references) << ": " << violation;
@@ -217,8 +215,7 @@ TEST(TreeBuild, NothingToBuild) {
   const scene::Mesh no_mesh;
   for (const References references : {References::once, References::all}) {
     for (const scene::Mesh* mesh : {&no_mesh, &vertices_only, &std::as_const(zero_area)}) {
-      const Tree tree =
-          build(mesh->view(), {.references = references, .measure_quality = true});
+      const Tree tree = build(mesh->view(), {.references = references, .measure_quality = true});
       EXPECT_TRUE(tree.view().empty());
       EXPECT_TRUE(tree.view().root.is_none());
       EXPECT_TRUE(tree.view().bounds.empty());
@@ -352,7 +349,8 @@ void measure(const Tree& tree, Link link, const double size[3], std::uint32_t de
   for (int c = 0; c < 2; ++c) {
     double child[3];
     for (int a = 0; a < 3; ++a) {
-      child[a] = std::max(0.0, static_cast<double>(node.hi(c, a)) - static_cast<double>(node.lo(c, a)));
+      child[a] =
+          std::max(0.0, static_cast<double>(node.hi(c, a)) - static_cast<double>(node.lo(c, a)));
     }
     measure(tree, node.child[c], child, depth + 1, root_area, quality);
   }

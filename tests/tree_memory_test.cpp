@@ -161,7 +161,8 @@ TEST(TreeMemory, NeverMoreThanWasAskedForBeforehand) {
 
           CountingResource exact;
           exact.limit = need.tree_bytes + need.workspace_bytes;
-          EXPECT_NO_THROW((void)build({.threads = threads, .memory = &exact}, m.mesh.view(), options));
+          EXPECT_NO_THROW(
+              (void)build({.threads = threads, .memory = &exact}, m.mesh.view(), options));
           EXPECT_EQ(exact.live_bytes(), 0u);
         }
       }
@@ -196,8 +197,7 @@ void expect_every_refusal_is_survived(const Work& work) {
       refusal = true;
       EXPECT_EQ(error.code(), ErrorCode::out_of_memory) << error.what();
       EXPECT_GT(error.offender(), 0u);
-      EXPECT_NE(std::string(error.what()).find(std::to_string(error.offender())),
-                std::string::npos)
+      EXPECT_NE(std::string(error.what()).find(std::to_string(error.offender())), std::string::npos)
           << error.what();
     }
     EXPECT_EQ(memory.live_bytes(), 0u) << "leaked when allocation " << refused << " was refused";
@@ -285,8 +285,7 @@ TEST(TreeMemory, CloneIsTheSameTreeInOtherMemory) {
       Tree copy;
       std::string hash;
       {
-        const Tree tree =
-            build({.memory = &one}, m.mesh.view(), options_for(References::once));
+        const Tree tree = build({.memory = &one}, m.mesh.view(), options_for(References::once));
         hash = tree_hash(tree.view());
         copy = tree.clone(&other);
         EXPECT_EQ(copy.statistics().references, tree.statistics().references);
@@ -309,8 +308,7 @@ TEST(TreeMemory, CloneIsTheSameTreeInOtherMemory) {
 
 TEST(TreeMemory, RefusedCloneThrowsAndLeaksNothing) {
   const Tree tree = build(scene::soup(100, 37).view());
-  expect_every_refusal_is_survived(
-      [&](CountingResource& memory) { (void)tree.clone(&memory); });
+  expect_every_refusal_is_survived([&](CountingResource& memory) { (void)tree.clone(&memory); });
 }
 
 TEST(TreeMemory, MovesLeaveAnEmptyTreeAndFreeTheOldOne) {

@@ -89,8 +89,8 @@ TEST(TreeSame, HashTellsTreesApart) {
   const Tree a = build(scene::soup(1000, 25).view());
   const Tree b = build(scene::soup(1000, 26).view());
   EXPECT_NE(tree_hash(a.view()), tree_hash(b.view()));
-  EXPECT_NE(tree_hash(a.view()), tree_hash(build(scene::soup(1000, 25).view(),
-                                                 skipping(References::all)).view()));
+  EXPECT_NE(tree_hash(a.view()),
+            tree_hash(build(scene::soup(1000, 25).view(), skipping(References::all)).view()));
 }
 
 // ---- Permuted input -----------------------------------------------------------------------------
@@ -100,8 +100,7 @@ TEST(TreeSame, ForPermutedTriangles) {
     for (const References references : {References::once, References::all}) {
       if (too_large_for(references, m)) continue;
       const BuildOptions options = skipping(references);
-      const std::string want =
-          tree_hash_mapped(build(m.mesh.view(), options).view(), {});
+      const std::string want = tree_hash_mapped(build(m.mesh.view(), options).view(), {});
       for (std::uint64_t seed = 0; seed < 3; ++seed) {
         std::vector<std::uint32_t> permutation;
         const scene::Mesh shuffled = scene::shuffled(m.mesh, seed, &permutation);
@@ -162,10 +161,9 @@ TEST(TreeSame, WithInvalidTrianglesAdded) {
       // At the end, at the front and between: zero area far away, NaN, infinity.
       scene::Mesh mesh = m.mesh;
       const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-      mesh.positions.insert(mesh.positions.end(), {{1e30F, 1e30F, 1e30F},
-                                                   {-1e30F, 1e20F, 3},
-                                                   {nan_value, 0, 0},
-                                                   {0, -infinity, 0}});
+      mesh.positions.insert(
+          mesh.positions.end(),
+          {{1e30F, 1e30F, 1e30F}, {-1e30F, 1e20F, 3}, {nan_value, 0, 0}, {0, -infinity, 0}});
       const std::vector<glm::uvec3> invalid = {{first, first, first + 1},
                                                {first, first + 1, first + 2},
                                                {first + 1, first + 3, first},
@@ -199,9 +197,9 @@ TEST(TreeSame, WhateverTheFormOfTheView) {
     for (const glm::uvec3& f : mesh.faces) {
       for (int c = 0; c < 3; ++c) soup.push_back(mesh.positions[f[c]]);
     }
-    EXPECT_EQ(tree_hash(build(TriangleView{std::span(std::as_const(soup))},
-                              skipping(references)).view()),
-              want);
+    EXPECT_EQ(
+        tree_hash(build(TriangleView{std::span(std::as_const(soup))}, skipping(references)).view()),
+        want);
     std::vector<float> wide(mesh.positions.size() * 8, 7.0F);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
       for (int a = 0; a < 3; ++a) wide[8 * i + static_cast<std::size_t>(a)] = mesh.positions[i][a];

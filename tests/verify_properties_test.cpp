@@ -155,7 +155,7 @@ TEST(VerifyProperties, TreeSpaceIsScaled) {
 
 TEST(VerifyProperties, Structure) {
   expect_broken(
-      small_once(), [](HandTree& t) { t.view.root = Link::node(0); }, "1", "leaf 0");
+      small_once(), [](HandTree& t) { t.view.root = Link::node(0); }, "1", "leaf 1");
   expect_broken(
       small_once(), [](HandTree& t) { t.view.root = Link::leaf(0); }, "1", "leaf 0");
   expect_broken(
@@ -168,7 +168,7 @@ TEST(VerifyProperties, Structure) {
       small_once(), [](HandTree& t) { t.nodes[1].child[0] = Link::node(70); }, "1", "node 70");
   expect_broken(
       small_once(), [](HandTree& t) { std::swap(t.nodes[0].child[0], t.nodes[0].child[1]); }, "1",
-      "leaf 0");
+      "leaf 1");
   expect_broken(
       small_once(), [](HandTree& t) { t.nodes[0].axis = 3; }, "1", "axis 3");
   expect_broken(

@@ -69,15 +69,13 @@ struct TriangleView {
   }
 
   /// Index of corner `corner` (0, 1, 2) of triangle `triangle`. No check.
-  [[nodiscard]] ZKD_HOST_DEVICE
-  std::uint32_t index(std::size_t triangle, int corner) const {
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t index(std::size_t triangle, int corner) const {
     const std::size_t at = 3 * triangle + static_cast<std::size_t>(corner);
     return indices != nullptr ? indices[at] : static_cast<std::uint32_t>(at);
   }
 
   /// The three floats of position `vertex`. No check.
-  [[nodiscard]] ZKD_HOST_DEVICE
-  const float* position(std::size_t vertex) const {
+  [[nodiscard]] ZKD_HOST_DEVICE const float* position(std::size_t vertex) const {
     return reinterpret_cast<const float*>(reinterpret_cast<const char*>(positions) +
                                           vertex * position_stride);
   }
@@ -90,8 +88,9 @@ struct Box {
   float hi[3] = {-std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
                  -std::numeric_limits<float>::infinity()};
 
-  [[nodiscard]] ZKD_HOST_DEVICE
-  bool empty() const { return !(lo[0] <= hi[0] && lo[1] <= hi[1] && lo[2] <= hi[2]); }
+  [[nodiscard]] ZKD_HOST_DEVICE bool empty() const {
+    return !(lo[0] <= hi[0] && lo[1] <= hi[1] && lo[2] <= hi[2]);
+  }
 };
 
 /// The points origin + t * direction, t in [t_min, t_max].

@@ -72,12 +72,10 @@ struct TrunkKey {
   std::uint64_t code = 0;
   std::uint64_t fine = 0;
 
-  friend ZKD_HOST_DEVICE
-  bool operator<(const TrunkKey& a, const TrunkKey& b) {
+  friend ZKD_HOST_DEVICE bool operator<(const TrunkKey& a, const TrunkKey& b) {
     return a.code != b.code ? a.code < b.code : a.fine < b.fine;
   }
-  friend ZKD_HOST_DEVICE
-  bool operator==(const TrunkKey& a, const TrunkKey& b) {
+  friend ZKD_HOST_DEVICE bool operator==(const TrunkKey& a, const TrunkKey& b) {
     return a.code == b.code && a.fine == b.fine;
   }
 };

@@ -26,18 +26,14 @@ struct Link {
   static constexpr std::uint32_t leaf_bit = 0x80000000u;
   static constexpr std::uint32_t none = 0xFFFFFFFFu;  ///< the root of an empty tree
 
-  [[nodiscard]] static constexpr ZKD_HOST_DEVICE
-  Link node(std::uint32_t index) { return {index}; }
-  [[nodiscard]] static constexpr ZKD_HOST_DEVICE
-  Link leaf(std::uint32_t index) { return {index | leaf_bit}; }
-  [[nodiscard]] constexpr ZKD_HOST_DEVICE
-  bool is_none() const { return bits == none; }
-  [[nodiscard]] constexpr ZKD_HOST_DEVICE
-  bool is_leaf() const { return (bits & leaf_bit) != 0; }
-  [[nodiscard]] constexpr ZKD_HOST_DEVICE
-  std::uint32_t index() const { return bits & ~leaf_bit; }
-  friend constexpr ZKD_HOST_DEVICE
-  bool operator==(Link a, Link b) { return a.bits == b.bits; }
+  [[nodiscard]] static constexpr ZKD_HOST_DEVICE Link node(std::uint32_t index) { return {index}; }
+  [[nodiscard]] static constexpr ZKD_HOST_DEVICE Link leaf(std::uint32_t index) {
+    return {index | leaf_bit};
+  }
+  [[nodiscard]] constexpr ZKD_HOST_DEVICE bool is_none() const { return bits == none; }
+  [[nodiscard]] constexpr ZKD_HOST_DEVICE bool is_leaf() const { return (bits & leaf_bit) != 0; }
+  [[nodiscard]] constexpr ZKD_HOST_DEVICE std::uint32_t index() const { return bits & ~leaf_bit; }
+  friend constexpr ZKD_HOST_DEVICE bool operator==(Link a, Link b) { return a.bits == b.bits; }
 };
 
 /// An inner node: an essential node of the poster, one cache line.
@@ -58,10 +54,12 @@ struct alignas(64) Node {
   float plane;
   std::uint32_t axis;
 
-  [[nodiscard]] ZKD_HOST_DEVICE
-  float lo(int which, int along) const { return bounds[along][which]; }
-  [[nodiscard]] ZKD_HOST_DEVICE
-  float hi(int which, int along) const { return bounds[along][2 + which]; }
+  [[nodiscard]] ZKD_HOST_DEVICE float lo(int which, int along) const {
+    return bounds[along][which];
+  }
+  [[nodiscard]] ZKD_HOST_DEVICE float hi(int which, int along) const {
+    return bounds[along][2 + which];
+  }
 };
 static_assert(sizeof(Node) == 64);
 
@@ -83,10 +81,10 @@ struct TreeView {
   /// lose digits.
   float scale = 1.0F;
 
-  [[nodiscard]] ZKD_HOST_DEVICE
-  std::uint32_t node_count() const { return leaf_count > 1 ? leaf_count - 1 : 0; }
-  [[nodiscard]] ZKD_HOST_DEVICE
-  bool empty() const { return leaf_count == 0; }
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t node_count() const {
+    return leaf_count > 1 ? leaf_count - 1 : 0;
+  }
+  [[nodiscard]] ZKD_HOST_DEVICE bool empty() const { return leaf_count == 0; }
 };
 
 /// Owns a finished tree in host memory: two blocks (nodes with leaf offsets, references) from the

@@ -25,8 +25,7 @@ struct Rounded<float> {
   float value = 0.0F;
 
   Rounded() = default;
-  ZKD_HOST_DEVICE
-  constexpr Rounded(float x) : value(x) {}
+  ZKD_HOST_DEVICE constexpr Rounded(float x) : value(x) {}
 
 #if defined(__CUDA_ARCH__)
   friend __device__ Rounded operator+(Rounded a, Rounded b) { return __fadd_rn(a.value, b.value); }
@@ -37,29 +36,20 @@ struct Rounded<float> {
     return __fmaf_rn(a.value, b.value, c.value);
   }
 #else
-  friend ZKD_HOST_DEVICE
-  Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
-  friend ZKD_HOST_DEVICE
-  Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
-  friend ZKD_HOST_DEVICE
-  Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
-  friend ZKD_HOST_DEVICE
-  Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
-  friend ZKD_HOST_DEVICE
-  Rounded fma(Rounded a, Rounded b, Rounded c) { return __builtin_fmaf(a.value, b.value, c.value); }
+  friend ZKD_HOST_DEVICE Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
+  friend ZKD_HOST_DEVICE Rounded fma(Rounded a, Rounded b, Rounded c) {
+    return __builtin_fmaf(a.value, b.value, c.value);
+  }
 #endif
-  friend ZKD_HOST_DEVICE
-  Rounded operator-(Rounded a) { return -a.value; }
-  friend ZKD_HOST_DEVICE
-  bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
-  friend ZKD_HOST_DEVICE
-  bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
-  friend ZKD_HOST_DEVICE
-  bool operator<=(Rounded a, Rounded b) { return a.value <= b.value; }
-  friend ZKD_HOST_DEVICE
-  bool operator>=(Rounded a, Rounded b) { return a.value >= b.value; }
-  friend ZKD_HOST_DEVICE
-  bool operator==(Rounded a, Rounded b) { return a.value == b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a) { return -a.value; }
+  friend ZKD_HOST_DEVICE bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
+  friend ZKD_HOST_DEVICE bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
+  friend ZKD_HOST_DEVICE bool operator<=(Rounded a, Rounded b) { return a.value <= b.value; }
+  friend ZKD_HOST_DEVICE bool operator>=(Rounded a, Rounded b) { return a.value >= b.value; }
+  friend ZKD_HOST_DEVICE bool operator==(Rounded a, Rounded b) { return a.value == b.value; }
 };
 
 template <>
@@ -67,8 +57,7 @@ struct Rounded<double> {
   double value = 0.0;
 
   Rounded() = default;
-  ZKD_HOST_DEVICE
-  constexpr Rounded(double x) : value(x) {}
+  ZKD_HOST_DEVICE constexpr Rounded(double x) : value(x) {}
 
 #if defined(__CUDA_ARCH__)
   friend __device__ Rounded operator+(Rounded a, Rounded b) { return __dadd_rn(a.value, b.value); }
@@ -76,21 +65,14 @@ struct Rounded<double> {
   friend __device__ Rounded operator*(Rounded a, Rounded b) { return __dmul_rn(a.value, b.value); }
   friend __device__ Rounded operator/(Rounded a, Rounded b) { return __ddiv_rn(a.value, b.value); }
 #else
-  friend ZKD_HOST_DEVICE
-  Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
-  friend ZKD_HOST_DEVICE
-  Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
-  friend ZKD_HOST_DEVICE
-  Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
-  friend ZKD_HOST_DEVICE
-  Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
 #endif
-  friend ZKD_HOST_DEVICE
-  Rounded operator-(Rounded a) { return -a.value; }
-  friend ZKD_HOST_DEVICE
-  bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
-  friend ZKD_HOST_DEVICE
-  bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a) { return -a.value; }
+  friend ZKD_HOST_DEVICE bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
+  friend ZKD_HOST_DEVICE bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
 };
 
 using Real = Rounded<float>;
@@ -98,27 +80,25 @@ using Wide = Rounded<double>;
 
 /// a * b - c * d with an error below 1.5 ulp and, short of underflow, the exact sign (Kahan;
 /// Jeannerod, Louvet, Muller: Further analysis of Kahan's algorithm, 2013).
-ZKD_HOST_DEVICE
-inline Real difference_of_products(Real a, Real b, Real c, Real d) {
+ZKD_HOST_DEVICE inline Real difference_of_products(Real a, Real b, Real c, Real d) {
   const Real cd = c * d;
   const Real rounding = fma(-c, d, cd);
   return fma(a, b, -cd) + rounding;
 }
 
 template <class T>
-ZKD_HOST_DEVICE
-constexpr T smaller(T a, T b) { return b < a ? b : a; }
+ZKD_HOST_DEVICE constexpr T smaller(T a, T b) {
+  return b < a ? b : a;
+}
 template <class T>
-ZKD_HOST_DEVICE
-constexpr T larger(T a, T b) { return a < b ? b : a; }
+ZKD_HOST_DEVICE constexpr T larger(T a, T b) {
+  return a < b ? b : a;
+}
 
-ZKD_HOST_DEVICE
-inline float magnitude(float x) { return __builtin_fabsf(x); }
-ZKD_HOST_DEVICE
-inline double magnitude(double x) { return __builtin_fabs(x); }
+ZKD_HOST_DEVICE inline float magnitude(float x) { return __builtin_fabsf(x); }
+ZKD_HOST_DEVICE inline double magnitude(double x) { return __builtin_fabs(x); }
 
-ZKD_HOST_DEVICE
-inline std::uint32_t bits_of(float x) {
+ZKD_HOST_DEVICE inline std::uint32_t bits_of(float x) {
 #if defined(__CUDA_ARCH__)
   return __float_as_uint(x);
 #else
@@ -126,12 +106,10 @@ inline std::uint32_t bits_of(float x) {
 #endif
 }
 
-ZKD_HOST_DEVICE
-inline bool is_finite(float x) { return (bits_of(x) & 0x7F800000u) != 0x7F800000u; }
+ZKD_HOST_DEVICE inline bool is_finite(float x) { return (bits_of(x) & 0x7F800000u) != 0x7F800000u; }
 
 /// Zeros in front of the first set bit; 64 for 0.
-ZKD_HOST_DEVICE
-inline std::uint32_t leading_zeros(std::uint64_t x) {
+ZKD_HOST_DEVICE inline std::uint32_t leading_zeros(std::uint64_t x) {
 #if defined(__CUDA_ARCH__)
   return static_cast<std::uint32_t>(__clzll(static_cast<long long>(x)));
 #else
@@ -140,8 +118,7 @@ inline std::uint32_t leading_zeros(std::uint64_t x) {
 }
 
 /// 2^exponent, for -1022 <= exponent <= 1023.
-ZKD_HOST_DEVICE
-inline double power_of_two(int exponent) {
+ZKD_HOST_DEVICE inline double power_of_two(int exponent) {
   const auto bits = static_cast<std::uint64_t>(exponent + 1023) << 52;
 #if defined(__CUDA_ARCH__)
   return __longlong_as_double(static_cast<long long>(bits));
@@ -152,8 +129,7 @@ inline double power_of_two(int exponent) {
 
 /// floor(log2(|x|)) of a finite x that is not 0 and whose magnitude is at least 2^-1022 (every
 /// float is).
-ZKD_HOST_DEVICE
-inline int exponent_of(double x) {
+ZKD_HOST_DEVICE inline int exponent_of(double x) {
 #if defined(__CUDA_ARCH__)
   const auto bits = static_cast<std::uint64_t>(__double_as_longlong(x));
 #else
@@ -163,8 +139,7 @@ inline int exponent_of(double x) {
 }
 
 /// floor(x) as an integer, for |x| < 2^31. (std::floor is a library call on portable x86-64.)
-ZKD_HOST_DEVICE
-inline std::int32_t floor_to_int(double x) {
+ZKD_HOST_DEVICE inline std::int32_t floor_to_int(double x) {
   const auto truncated = static_cast<std::int32_t>(x);
   return truncated - (x < static_cast<double>(truncated) ? 1 : 0);
 }

@@ -17,9 +17,8 @@ namespace zkd::core {
 
 /// Cuts the cell of a leaf out of the scene box: on each of its six sides the first plane met on
 /// the way up.
-ZKD_HOST_DEVICE
-inline Box leaf_cell(const Node* nodes, const Parent* parents_of_nodes, Parent parent,
-                     const Box& bounds) {
+ZKD_HOST_DEVICE inline Box leaf_cell(const Node* nodes, const Parent* parents_of_nodes,
+                                     Parent parent, const Box& bounds) {
   Box cell = bounds;
   std::uint32_t open_sides = 0x3F;
   while (!parent.is_none() && open_sides != 0) {
@@ -50,8 +49,7 @@ struct TightBoxes {
   bool clip;  ///< `all`: a leaf's box is what lies in its cell
   Node* nodes;
 
-  ZKD_HOST_DEVICE
-  Parent leave(Parent parent, const Box& box) const {
+  ZKD_HOST_DEVICE Parent leave(Parent parent, const Box& box) const {
     if (!parent.is_none()) {
       Node& node = nodes[parent.node()];
       for (int a = 0; a < 3; ++a) {
@@ -62,8 +60,7 @@ struct TightBoxes {
     return parent;
   }
 
-  ZKD_HOST_DEVICE
-  Parent begin(std::uint32_t leaf) const {
+  ZKD_HOST_DEVICE Parent begin(std::uint32_t leaf) const {
     const Parent parent = parents_of_leaves[leaf];
     Box cell;
     if (clip) cell = leaf_cell(nodes, parents_of_nodes, parent, frame->bounds);
@@ -85,8 +82,7 @@ struct TightBoxes {
     return leave(parent, box);
   }
 
-  ZKD_HOST_DEVICE
-  Parent rise(std::uint32_t index) const {
+  ZKD_HOST_DEVICE Parent rise(std::uint32_t index) const {
     const Node& node = nodes[index];
     Box box;
     for (int a = 0; a < 3; ++a) {

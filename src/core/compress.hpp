@@ -17,12 +17,9 @@ namespace zkd::core {
 struct Parent {
   std::uint32_t bits = 0xFFFFFFFFu;  ///< node * 2 + side; all ones: none
 
-  [[nodiscard]] ZKD_HOST_DEVICE
-  bool is_none() const { return bits == 0xFFFFFFFFu; }
-  [[nodiscard]] ZKD_HOST_DEVICE
-  std::uint32_t node() const { return bits >> 1; }
-  [[nodiscard]] ZKD_HOST_DEVICE
-  std::uint32_t side() const { return bits & 1u; }
+  [[nodiscard]] ZKD_HOST_DEVICE bool is_none() const { return bits == 0xFFFFFFFFu; }
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t node() const { return bits >> 1; }
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t side() const { return bits & 1u; }
 };
 
 /// Where links go: children of node j to links[stride * j] and the next, ways up to two arrays.
@@ -35,13 +32,12 @@ struct LinkWriter {
   const std::uint32_t* trunk_count;
   std::uint32_t trunks = 0;
 
-  ZKD_HOST_DEVICE
-  void load() { trunks = *trunk_count; }
+  ZKD_HOST_DEVICE void load() { trunks = *trunk_count; }
 
   /// Links `child`, which covers trunks left..right, to the node above it: of the two essential
   /// nodes at its ends the one with the longer prefix.
-  ZKD_HOST_DEVICE
-  void link(Link child, std::uint32_t left, std::uint32_t right, const std::uint8_t* levels) const {
+  ZKD_HOST_DEVICE void link(Link child, std::uint32_t left, std::uint32_t right,
+                            const std::uint8_t* levels) const {
     const bool has_left = left > 0;
     const bool has_right = right + 1 < trunks;
     Parent parent;
@@ -63,11 +59,9 @@ struct LinkTrunk {
   const std::uint8_t* levels;
   LinkWriter writer;
 
-  ZKD_HOST_DEVICE
-  void load() { writer.load(); }
+  ZKD_HOST_DEVICE void load() { writer.load(); }
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t trunk) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t trunk) const {
     writer.link(Link::leaf(trunk), trunk, trunk, levels);
   }
 };
@@ -77,22 +71,33 @@ struct LinkEssentialNode {
   const std::uint8_t* levels;
   LinkWriter writer;
 
-  ZKD_HOST_DEVICE
-  void load() { writer.load(); }
+  ZKD_HOST_DEVICE void load() { writer.load(); }
+
+  /// Neighbours to look at before searching the keys.
+  static constexpr std::uint32_t near_by = 16;
 
   /// The trunks below a node are those with its prefix: neighbours, since keys are sorted.
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t node) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t node) const {
     const std::uint32_t level = levels[node];
-    const TrunkKey lowest = lowest_below(trunk_keys[node], level);
-    const TrunkKey highest = highest_below(trunk_keys[node], level);
-    const std::uint32_t left =
-        node - run_length(node, [&](std::uint32_t n) { return !(trunk_keys[node - n] < lowest); });
-    const std::uint32_t right =
-        node + 1 + run_length(writer.trunks - node - 2, [&](std::uint32_t n) {
-          return !(highest < trunk_keys[node + 1 + n]);
-        });
-    writer.link(Link::node(node), left, right, levels);
+    const std::uint32_t before = node;                      // trunks before the two that part here
+    const std::uint32_t behind = writer.trunks - node - 2;  // and behind them
+    // Most nodes have few trunks below: a look at the neighbours' levels settles those.
+    std::uint32_t left = 0;
+    while (left < before && left < near_by && levels[node - left - 1] > level) ++left;
+    std::uint32_t right = 0;
+    while (right < behind && right < near_by && levels[node + right + 1] > level) ++right;
+    if (left == near_by) {
+      const TrunkKey lowest = lowest_below(trunk_keys[node], level);
+      left += run_length(before - left,
+                         [&](std::uint32_t n) { return !(trunk_keys[node - left - n] < lowest); });
+    }
+    if (right == near_by) {
+      const TrunkKey highest = highest_below(trunk_keys[node], level);
+      right += run_length(behind - right, [&](std::uint32_t n) {
+        return !(highest < trunk_keys[node + 1 + right + n]);
+      });
+    }
+    writer.link(Link::node(node), node - left, node + 1 + right, levels);
   }
 };
 

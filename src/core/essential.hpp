@@ -15,8 +15,7 @@ struct EssentialLevel {
   const TrunkKey* trunk_keys;
   std::uint8_t* levels;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t node) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t node) const {
     levels[node] = static_cast<std::uint8_t>(parting_level(trunk_keys[node], trunk_keys[node + 1]));
   }
 };

@@ -23,15 +23,13 @@ struct Candidate {
   float v = 0.0F;
   std::uint32_t triangle = no_triangle;
 
-  [[nodiscard]] ZKD_HOST_DEVICE
-  bool found() const { return triangle != no_triangle; }
+  [[nodiscard]] ZKD_HOST_DEVICE bool found() const { return triangle != no_triangle; }
 };
 
 /// Replaces `best` by the hit on this triangle, if there is one in the ray's interval and nearer.
 /// Returns whether it did.
-ZKD_HOST_DEVICE
-inline bool intersect(const PreparedRay& ray, const Corners& corners, std::uint32_t id,
-                      Candidate& best) {
+ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& corners,
+                                      std::uint32_t id, Candidate& best) {
   Real x[3];
   Real y[3];
   Real depth[3];

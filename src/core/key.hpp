@@ -23,8 +23,7 @@ inline constexpr std::uint32_t max_depth = level_count;
 
 /// The level at which two keys first differ; level_count if they are equal. The node of the
 /// conceptual tree at which they part has a prefix of this many bits.
-ZKD_HOST_DEVICE
-inline std::uint32_t parting_level(const TrunkKey& a, const TrunkKey& b) {
+ZKD_HOST_DEVICE inline std::uint32_t parting_level(const TrunkKey& a, const TrunkKey& b) {
   const std::uint64_t code = a.code ^ b.code;
   if (code != 0) return leading_zeros(code);
   const std::uint64_t fine = a.fine ^ b.fine;
@@ -32,16 +31,14 @@ inline std::uint32_t parting_level(const TrunkKey& a, const TrunkKey& b) {
 }
 
 /// The lowest key below the node of the conceptual tree that has the first `level` bits of `key`.
-ZKD_HOST_DEVICE
-inline TrunkKey lowest_below(const TrunkKey& key, std::uint32_t level) {
+ZKD_HOST_DEVICE inline TrunkKey lowest_below(const TrunkKey& key, std::uint32_t level) {
   if (level < first_fine_level) return {level == 0 ? 0 : key.code & (~0ull << (64 - level)), 0};
   const std::uint32_t fine = level - first_fine_level;
   return {key.code, fine == 0 ? 0 : key.fine & (~0ull << (64 - fine))};
 }
 
 /// The highest.
-ZKD_HOST_DEVICE
-inline TrunkKey highest_below(const TrunkKey& key, std::uint32_t level) {
+ZKD_HOST_DEVICE inline TrunkKey highest_below(const TrunkKey& key, std::uint32_t level) {
   if (level < first_fine_level) return {key.code | (~0ull >> level), ~0ull};
   return {key.code, key.fine | (~0ull >> (level - first_fine_level))};
 }
@@ -55,11 +52,9 @@ struct SortedKeys {
   const std::uint32_t* code_bits;  ///< of the lattice
   std::uint32_t align = 0;
 
-  ZKD_HOST_DEVICE
-  void load() { align = smaller(64 - *code_bits, 63u); }
+  ZKD_HOST_DEVICE void load() { align = smaller(64 - *code_bits, 63u); }
 
-  ZKD_HOST_DEVICE
-  TrunkKey operator[](std::uint32_t i) const {
+  ZKD_HOST_DEVICE TrunkKey operator[](std::uint32_t i) const {
     return {static_cast<std::uint64_t>(codes[i]) << align,
             fine != nullptr ? static_cast<std::uint64_t>(fine[i]) << 32 : 0};
   }
@@ -71,10 +66,8 @@ struct WriteKey {
   SortedKeys<Code> keys;
   TrunkKey* out;
 
-  ZKD_HOST_DEVICE
-  void load() { keys.load(); }
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t i) const { out[i] = keys[i]; }
+  ZKD_HOST_DEVICE void load() { keys.load(); }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const { out[i] = keys[i]; }
 };
 
 }  // namespace zkd::core

@@ -18,8 +18,7 @@ namespace zkd::core {
 /// a surface crosses about 2^21 cells of a lattice of 2^32.
 inline constexpr std::uint32_t wide_code_threshold = 1u << 22;
 
-ZKD_HOST_DEVICE
-inline std::uint32_t choose_code_bits(std::uint32_t asked, std::uint32_t valid) {
+ZKD_HOST_DEVICE inline std::uint32_t choose_code_bits(std::uint32_t asked, std::uint32_t valid) {
   if (asked != 0) return asked;
   return valid < wide_code_threshold ? 32 : 64;
 }
@@ -29,15 +28,13 @@ struct WideBox {
   double lo[3] = {1.0e300, 1.0e300, 1.0e300};
   double hi[3] = {-1.0e300, -1.0e300, -1.0e300};
 
-  ZKD_HOST_DEVICE
-  void include(const double (&point)[3]) {
+  ZKD_HOST_DEVICE void include(const double (&point)[3]) {
     for (int a = 0; a < 3; ++a) {
       lo[a] = smaller(lo[a], point[a]);
       hi[a] = larger(hi[a], point[a]);
     }
   }
-  ZKD_HOST_DEVICE
-  void combine(const WideBox& other) {
+  ZKD_HOST_DEVICE void combine(const WideBox& other) {
     for (int a = 0; a < 3; ++a) {
       lo[a] = smaller(lo[a], other.lo[a]);
       hi[a] = larger(hi[a], other.hi[a]);
@@ -45,8 +42,7 @@ struct WideBox {
   }
 };
 
-ZKD_HOST_DEVICE
-inline WideBox widen(const Box& box) {
+ZKD_HOST_DEVICE inline WideBox widen(const Box& box) {
   WideBox wide;
   for (int a = 0; a < 3; ++a) {
     wide.lo[a] = static_cast<double>(box.lo[a]);
@@ -56,8 +52,7 @@ inline WideBox widen(const Box& box) {
 }
 
 /// The smallest power of two that is larger than `x` >= 0, as an exponent.
-ZKD_HOST_DEVICE
-inline int exponent_above(double x) { return exponent_of(x) + 1; }
+ZKD_HOST_DEVICE inline int exponent_above(double x) { return exponent_of(x) + 1; }
 
 /// One axis while the lattice is being made.
 struct LatticeAxis {
@@ -67,15 +62,12 @@ struct LatticeAxis {
   int smallest;  ///< cells are not smaller than 2^smallest: planes have to be floats
   std::uint32_t bits;
 
-  [[nodiscard]] ZKD_HOST_DEVICE
-  int cell() const { return side - static_cast<int>(bits); }
-  [[nodiscard]] ZKD_HOST_DEVICE
-  bool can_split() const { return lo < hi && cell() > smallest; }
+  [[nodiscard]] ZKD_HOST_DEVICE int cell() const { return side - static_cast<int>(bits); }
+  [[nodiscard]] ZKD_HOST_DEVICE bool can_split() const { return lo < hi && cell() > smallest; }
 };
 
 /// Which axis the next level splits, or 3 for none.
-ZKD_HOST_DEVICE
-inline int next_axis(const LatticeAxis (&axes)[3], AxisOrder order, int last) {
+ZKD_HOST_DEVICE inline int next_axis(const LatticeAxis (&axes)[3], AxisOrder order, int last) {
   if (order == AxisOrder::cyclic) {
     for (int step = 1; step <= 3; ++step) {
       const int a = (last + step) % 3;
@@ -90,9 +82,8 @@ inline int next_axis(const LatticeAxis (&axes)[3], AxisOrder order, int last) {
 }
 
 /// Deals `code_bits` bits to the axes and writes the schedule.
-ZKD_HOST_DEVICE
-inline void schedule_axes(LatticeAxis (&axes)[3], std::uint32_t code_bits, AxisOrder order,
-                          Lattice& lattice) {
+ZKD_HOST_DEVICE inline void schedule_axes(LatticeAxis (&axes)[3], std::uint32_t code_bits,
+                                          AxisOrder order, Lattice& lattice) {
   for (LatticeAxis& axis : axes) axis.bits = 0;
   lattice = Lattice{};
   int last = 2;
@@ -106,8 +97,7 @@ inline void schedule_axes(LatticeAxis (&axes)[3], std::uint32_t code_bits, AxisO
 
 /// Whether [lo, hi] lies inside the lattice's cells along this axis and all their planes are
 /// floats; if not, widens what was too tight. One cell needs neither: it has no planes.
-ZKD_HOST_DEVICE
-inline bool settle(LatticeAxis& axis) {
+ZKD_HOST_DEVICE inline bool settle(LatticeAxis& axis) {
   if (axis.bits == 0) return true;
   const double inverse = power_of_two(-axis.cell());
   const std::int64_t origin = floor_to_int(axis.lo * inverse);
@@ -126,8 +116,8 @@ inline bool settle(LatticeAxis& axis) {
 }
 
 /// See zkd::stages::make_lattice. An inverted box gives a lattice without bits.
-ZKD_HOST_DEVICE
-inline Lattice make_lattice(const WideBox& box, std::uint32_t code_bits, AxisOrder order) {
+ZKD_HOST_DEVICE inline Lattice make_lattice(const WideBox& box, std::uint32_t code_bits,
+                                            AxisOrder order) {
   Lattice lattice;
   LatticeAxis axes[3];
   for (int a = 0; a < 3; ++a) {
@@ -157,15 +147,13 @@ inline Lattice make_lattice(const WideBox& box, std::uint32_t code_bits, AxisOrd
 }
 
 /// Position of plane `k` of axis `a`, exact.
-ZKD_HOST_DEVICE
-inline double plane_position(const Lattice& lattice, int a, std::uint32_t k) {
+ZKD_HOST_DEVICE inline double plane_position(const Lattice& lattice, int a, std::uint32_t k) {
   return static_cast<double>(lattice.origin[a] + static_cast<std::int64_t>(k)) *
          power_of_two(lattice.exponent[a]);
 }
 
 /// log2 of TreeView::scale for a scene inside `bounds`.
-ZKD_HOST_DEVICE
-inline int scale_exponent(const Box& bounds) {
+ZKD_HOST_DEVICE inline int scale_exponent(const Box& bounds) {
   if (bounds.empty()) return 0;
   double largest = 0.0;
   for (int a = 0; a < 3; ++a) {
@@ -186,8 +174,8 @@ struct SceneFrame {
   double largest = 0.0;  ///< magnitude of any coordinate
 
   SceneFrame() = default;
-  ZKD_HOST_DEVICE
-  explicit SceneFrame(const Box& scene) : scale(power_of_two(scale_exponent(scene))) {
+  ZKD_HOST_DEVICE explicit SceneFrame(const Box& scene)
+      : scale(power_of_two(scale_exponent(scene))) {
     for (int a = 0; a < 3; ++a) {
       bounds.lo[a] = scene.lo[a] * static_cast<float>(scale);
       bounds.hi[a] = scene.hi[a] * static_cast<float>(scale);

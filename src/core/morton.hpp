@@ -21,8 +21,7 @@ struct BitDealer {
 
   BitDealer() = default;
 
-  ZKD_HOST_DEVICE
-  explicit BitDealer(std::uint64_t the_mask) : mask(the_mask) {
+  ZKD_HOST_DEVICE explicit BitDealer(std::uint64_t the_mask) : mask(the_mask) {
     std::uint64_t m = mask;
     std::uint64_t to_count = ~m << 1;  // bits below which there are unset ones
     for (int i = 0; i < 6; ++i) {
@@ -36,8 +35,7 @@ struct BitDealer {
 
   /// expand: bit i of `x` goes to the i-th set bit of the mask.
   template <class Code>
-  [[nodiscard]] ZKD_HOST_DEVICE
-  Code deal(Code x) const {
+  [[nodiscard]] ZKD_HOST_DEVICE Code deal(Code x) const {
     constexpr int steps = sizeof(Code) == 4 ? 5 : 6;
     for (int i = steps - 1; i >= 0; --i) {
       const Code move = static_cast<Code>(moves[i]);
@@ -48,8 +46,7 @@ struct BitDealer {
   }
 
   /// compress: the i-th set bit of the mask in `x` becomes bit i.
-  [[nodiscard]] ZKD_HOST_DEVICE
-  std::uint64_t collect(std::uint64_t x) const {
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint64_t collect(std::uint64_t x) const {
     x &= mask;
     for (int i = 0; i < 6; ++i) {
       const std::uint64_t moved = x & moves[i];
@@ -60,8 +57,7 @@ struct BitDealer {
 };
 
 /// Centre of a box along one axis: exact in double but for floats 2^29 times apart.
-ZKD_HOST_DEVICE
-inline double centre(const Box& box, int a) {
+ZKD_HOST_DEVICE inline double centre(const Box& box, int a) {
   return (static_cast<double>(box.lo[a]) + static_cast<double>(box.hi[a])) * 0.5;
 }
 
@@ -73,8 +69,7 @@ struct MortonCoder {
 
   MortonCoder() = default;
 
-  ZKD_HOST_DEVICE
-  explicit MortonCoder(const Lattice& lattice) {
+  ZKD_HOST_DEVICE explicit MortonCoder(const Lattice& lattice) {
     for (int a = 0; a < 3; ++a) {
       inverse_cell[a] = power_of_two(-lattice.exponent[a]);
       origin[a] = lattice.origin[a];
@@ -84,8 +79,7 @@ struct MortonCoder {
 
   /// The code of a point inside the lattice, right-aligned. An axis without bits adds none.
   template <class Code>
-  [[nodiscard]] ZKD_HOST_DEVICE
-  Code encode(const double (&point)[3]) const {
+  [[nodiscard]] ZKD_HOST_DEVICE Code encode(const double (&point)[3]) const {
     Code code = 0;
     for (int a = 0; a < 3; ++a) {
       const std::int32_t cell = floor_to_int(point[a] * inverse_cell[a]) - origin[a];
@@ -95,26 +89,26 @@ struct MortonCoder {
   }
 
   /// Coordinate along axis `a` of the cell that `code` names.
-  [[nodiscard]] ZKD_HOST_DEVICE
-  std::uint32_t cell(std::uint64_t code, int a) const {
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t cell(std::uint64_t code, int a) const {
     return static_cast<std::uint32_t>(dealer[a].collect(code));
   }
 };
 
-/// One triangle: the code of its box's centre. `ids` names the triangles to encode, or is null for
-/// all.
+/// One triangle, named by `ids`: the code of its box's centre.
 template <class Code>
 struct EncodeTriangle {
   const Box* boxes;
   const std::uint32_t* ids;
-  const MortonCoder* coder;
+  const MortonCoder* scene_coder;
   Code* codes;
+  MortonCoder coder{};  // a copy: through the pointer it would be read again for every code
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t i) const {
-    const Box& box = boxes[ids != nullptr ? ids[i] : i];
+  ZKD_HOST_DEVICE void load() { coder = *scene_coder; }
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const {
+    const Box& box = boxes[ids[i]];
     const double point[3] = {centre(box, 0), centre(box, 1), centre(box, 2)};
-    codes[i] = coder->template encode<Code>(point);
+    codes[i] = coder.template encode<Code>(point);
   }
 };
 

@@ -90,8 +90,7 @@ struct PrepareScene {
   std::uint32_t code_bits_asked;
   AxisOrder order;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
     const std::uint32_t bits = choose_code_bits(code_bits_asked, state->report.valid);
     state->left_out = triangle_count - state->report.valid;
     state->root = Link{};
@@ -105,22 +104,23 @@ struct PrepareScene {
 
 struct CountNodes {
   BuildState* state;
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t) const { state->nodes = state->trunks > 0 ? state->trunks - 1 : 0; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
+    state->nodes = state->trunks > 0 ? state->trunks - 1 : 0;
+  }
 };
 
 struct ReferenceOnce {
   BuildState* state;
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t) const { state->references = state->report.valid; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const { state->references = state->report.valid; }
 };
 
 /// Puts the end behind the offsets of all leaves.
 struct CloseOffsets {
   BuildState* state;
   std::uint32_t* leaf_offsets;
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t) const { leaf_offsets[state->trunks] = state->references; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
+    leaf_offsets[state->trunks] = state->references;
+  }
 };
 
 /// One build. `Code` only has to hold the bits of the lattice: it does not change the tree.
@@ -234,7 +234,7 @@ class MortonPipeline {
     backend_.stage(Stage::split_planes);
     Node* nodes = backend_.nodes();
     const CrowdByPosition crowd{work.first, recoded_.first, &state_->crowded_trunks,
-                                recoded_.lattices};
+                                recoded_.lattices, recoded_.coders};
     backend_.for_each(this->nodes(),
                       PlaceSplitPlane<CrowdByPosition>{
                           work.trunk_keys,

@@ -22,9 +22,8 @@ struct SplitPlane {
 
 /// The plane of a node of this level below which `above` is a key on the upper side. Cut behind
 /// the level, that key names the first cell above the plane.
-ZKD_HOST_DEVICE
-inline SplitPlane split_plane(const Lattice& lattice, const MortonCoder& coder, std::uint64_t above,
-                              std::uint32_t level) {
+ZKD_HOST_DEVICE inline SplitPlane split_plane(const Lattice& lattice, const MortonCoder& coder,
+                                              std::uint64_t above, std::uint32_t level) {
   const std::uint64_t first = above & (~0ull << (63 - level));
   const std::uint32_t axis = lattice.axis[level];
   const std::uint32_t k = coder.cell(first >> (64 - lattice.code_bits), static_cast<int>(axis));
@@ -37,10 +36,12 @@ struct CrowdByPosition {
   const std::uint32_t* crowded_first;  ///< of each crowded trunk's, ascending
   const std::uint32_t* crowded_count;
   const Lattice* lattices;
+  const MortonCoder* coders;
 
-  ZKD_HOST_DEVICE
-  const Lattice& operator[](std::uint32_t trunk) const {
-    return lattices[last_at_or_before(crowded_first, *crowded_count, first[trunk])];
+  ZKD_HOST_DEVICE SplitPlane plane(std::uint32_t trunk, std::uint64_t above,
+                                   std::uint32_t level) const {
+    const std::uint32_t crowd = last_at_or_before(crowded_first, *crowded_count, first[trunk]);
+    return split_plane(lattices[crowd], coders[crowd], above, level);
   }
 };
 
@@ -49,8 +50,11 @@ struct CrowdByTrunk {
   const std::uint32_t* crowd;
   const Lattice* lattices;
 
-  ZKD_HOST_DEVICE
-  const Lattice& operator[](std::uint32_t trunk) const { return lattices[crowd[trunk]]; }
+  ZKD_HOST_DEVICE SplitPlane plane(std::uint32_t trunk, std::uint64_t above,
+                                   std::uint32_t level) const {
+    const Lattice& lattice = lattices[crowd[trunk]];
+    return split_plane(lattice, MortonCoder(lattice), above, level);
+  }
 };
 
 /// Where planes go: `stride` elements from one node's to the next.
@@ -71,16 +75,15 @@ struct PlaceSplitPlane {
   const double* scale;
   PlaneWriter writer;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t node) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t node) const {
     const TrunkKey& above = trunk_keys[node + 1];
     const std::uint32_t level = levels[node];
     SplitPlane plane;
     if (level < first_fine_level) {
       plane = split_plane(*lattice, *coder, above.code, level);
     } else {
-      const Lattice& fine = crowd[node + 1];
-      plane = split_plane(fine, MortonCoder(fine), above.fine, level - first_fine_level);
+      // Second-round codes are the upper half of `fine`, and of their split_plane's.
+      plane = crowd.plane(node + 1, above.fine, level - first_fine_level);
     }
     writer.axes[writer.stride * node] = plane.axis;
     writer.planes[writer.stride * node] = static_cast<float>(plane.position * *scale);

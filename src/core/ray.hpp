@@ -43,8 +43,7 @@ struct PreparedRay {
   Real scale;
   bool valid = false;
 
-  ZKD_HOST_DEVICE
-  PreparedRay(const TreeView& tree, const Ray& ray)
+  ZKD_HOST_DEVICE PreparedRay(const TreeView& tree, const Ray& ray)
       : t_min(ray.t_min), t_max(ray.t_max), scale(tree.scale) {
     const float origin_in[3] = {ray.origin.x, ray.origin.y, ray.origin.z};
     const float direction_in[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
@@ -119,17 +118,15 @@ struct PreparedRay {
   }
 
   /// The caller's t of a hit at `t` in tree space.
-  [[nodiscard]] ZKD_HOST_DEVICE
-  float callers_t(Real t) const {
+  [[nodiscard]] ZKD_HOST_DEVICE float callers_t(Real t) const {
     return static_cast<float>(((Wide(static_cast<double>(t.value)) + t_shift) * t_scale).value);
   }
 
  private:
   /// Moves `from` along the ray to the point nearest to the scene's centre. False: that point is so
   /// far out that the ray passes the scene.
-  ZKD_HOST_DEVICE
-  bool approach(const Wide (&low)[3], const Wide (&high)[3], const Wide (&direction)[3],
-                Wide (&from)[3], double coordinate) {
+  ZKD_HOST_DEVICE bool approach(const Wide (&low)[3], const Wide (&high)[3],
+                                const Wide (&direction)[3], Wide (&from)[3], double coordinate) {
     Wide along = 0.0;
     Wide squared = 0.0;
     for (int a = 0; a < 3; ++a) {
@@ -146,8 +143,7 @@ struct PreparedRay {
   }
 
   /// An end of the interval in tree space, moved outward by more than the rounding of t.
-  [[nodiscard]] ZKD_HOST_DEVICE
-  Real bound(float t, Wide to_tree, double outward) const {
+  [[nodiscard]] ZKD_HOST_DEVICE Real bound(float t, Wide to_tree, double outward) const {
     if (!is_finite(t)) return t;
     const Wide end = Wide(static_cast<double>(t)) * to_tree;
     constexpr double slack = 1.0 / 4194304.0;  // 2^-22

@@ -29,11 +29,9 @@ struct BeginsCrowdedTrunk {
   std::uint32_t leaf_size;
   std::uint32_t count = 0;
 
-  ZKD_HOST_DEVICE
-  void load() { count = *code_count; }
+  ZKD_HOST_DEVICE void load() { count = *code_count; }
 
-  ZKD_HOST_DEVICE
-  bool operator()(std::uint32_t i) const {
+  ZKD_HOST_DEVICE bool operator()(std::uint32_t i) const {
     if (i >= count - smaller(count, leaf_size) || codes[i] != codes[i + leaf_size]) return false;
     return i == 0 || codes[i - 1] != codes[i];
   }
@@ -47,11 +45,9 @@ struct CrowdedTrunkLength {
   const std::uint32_t* first;
   std::uint32_t count = 0;
 
-  ZKD_HOST_DEVICE
-  void load() { count = *code_count; }
+  ZKD_HOST_DEVICE void load() { count = *code_count; }
 
-  ZKD_HOST_DEVICE
-  std::uint32_t operator()(std::uint32_t c) const {
+  ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t c) const {
     const std::uint32_t begin = first[c];
     return 1 + run_length(count - 1 - begin,
                           [&](std::uint32_t n) { return codes[begin + n] == codes[begin]; });
@@ -69,8 +65,7 @@ struct CrowdedTriangles {
     std::uint32_t trunk;
     std::uint32_t position;
   };
-  [[nodiscard]] ZKD_HOST_DEVICE
-  Place operator[](std::uint32_t k) const {
+  [[nodiscard]] ZKD_HOST_DEVICE Place operator[](std::uint32_t k) const {
     const std::uint32_t trunk = last_at_or_before(offsets, *trunks, k);
     return {trunk, first[trunk] + (k - offsets[trunk])};
   }
@@ -83,8 +78,7 @@ struct IncludeCentre {
   const std::uint32_t* first;
   const std::uint32_t* offsets;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t trunk, std::uint32_t k, WideBox& box) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t trunk, std::uint32_t k, WideBox& box) const {
     const Box& triangle = boxes[ids[first[trunk] + (k - offsets[trunk])]];
     box.include({centre(triangle, 0), centre(triangle, 1), centre(triangle, 2)});
   }
@@ -95,10 +89,11 @@ struct CrowdedLattice {
   const WideBox* centres;
   AxisOrder order;
   Lattice* lattices;
+  MortonCoder* coders;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t c) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t c) const {
     lattices[c] = make_lattice(centres[c], fine_bits, order);
+    coders[c] = MortonCoder(lattices[c]);
   }
 };
 
@@ -108,19 +103,18 @@ struct RecodeTriangle {
   const std::uint32_t* ids;
   CrowdedTriangles crowded;
   const Lattice* lattices;
+  const MortonCoder* coders;
   std::uint64_t* fine_keys;
   std::uint32_t* fine_ids;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t k) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t k) const {
     const CrowdedTriangles::Place place = crowded[k];
     const std::uint32_t id = ids[place.position];
-    const Lattice& lattice = lattices[place.trunk];
     const Box& box = boxes[id];
     const double point[3] = {centre(box, 0), centre(box, 1), centre(box, 2)};
-    const auto code = MortonCoder(lattice).encode<std::uint64_t>(point);
-    fine_keys[k] =
-        (static_cast<std::uint64_t>(place.trunk) << 32) | (code << (fine_bits - lattice.code_bits));
+    const std::uint64_t code = coders[place.trunk].encode<std::uint32_t>(point);
+    fine_keys[k] = (static_cast<std::uint64_t>(place.trunk) << 32) |
+                   (code << (fine_bits - lattices[place.trunk].code_bits));
     fine_ids[k] = id;
   }
 };
@@ -133,8 +127,7 @@ struct PlaceRecoded {
   std::uint32_t* ids;
   std::uint32_t* fine;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t k) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t k) const {
     const std::uint32_t position = crowded[k].position;
     ids[position] = fine_ids[k];
     fine[position] = static_cast<std::uint32_t>(fine_keys[k]);
@@ -146,8 +139,7 @@ struct NumberCrowd {
   CrowdedTriangles crowded;
   std::uint32_t* crowd;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t k) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t k) const {
     const CrowdedTriangles::Place place = crowded[k];
     crowd[place.position] = place.trunk;
   }
@@ -159,6 +151,7 @@ struct RecodeWorkspace {
   std::uint32_t* offsets = nullptr;
   WideBox* centres = nullptr;
   Lattice* lattices = nullptr;
+  MortonCoder* coders = nullptr;
   SortBuffers<std::uint64_t> sort{};
   std::uint32_t* fine = nullptr;
 
@@ -167,6 +160,7 @@ struct RecodeWorkspace {
     offsets = arena.take<std::uint32_t>(trunks);
     centres = arena.take<WideBox>(trunks);
     lattices = arena.take<Lattice>(trunks);
+    coders = arena.take<MortonCoder>(trunks);
     sort = {arena.take<std::uint64_t>(crowded), arena.take<std::uint32_t>(crowded),
             arena.take<std::uint64_t>(crowded), arena.take<std::uint32_t>(crowded)};
     fine = arena.take<std::uint32_t>(triangles);
@@ -220,9 +214,9 @@ class SecondRound {
 
     backend.segmented_reduce(trunks, work.offsets, crowded, work.centres,
                              IncludeCentre{boxes, ids, work.first, work.offsets});
-    backend.for_each(trunks, CrowdedLattice{work.centres, order, work.lattices});
-    backend.for_each(crowded, RecodeTriangle{boxes, ids, members(), work.lattices, work.sort.keys,
-                                             work.sort.values});
+    backend.for_each(trunks, CrowdedLattice{work.centres, order, work.lattices, work.coders});
+    backend.for_each(crowded, RecodeTriangle{boxes, ids, members(), work.lattices, work.coders,
+                                             work.sort.keys, work.sort.values});
     work.sort =
         backend.radix_sort(work.sort, crowded, fine_bits + bits_to_count(backend.size(trunks)));
     backend.for_each(triangles, Fill{work.fine, 0});

@@ -25,8 +25,7 @@ struct PlacedTriangle {
   Box box;
 
   PlacedTriangle() = default;
-  ZKD_HOST_DEVICE
-  PlacedTriangle(const Corners& corners, double scale) {
+  ZKD_HOST_DEVICE PlacedTriangle(const Corners& corners, double scale) {
     for (int i = 0; i < 3; ++i)
       for (int a = 0; a < 3; ++a) corner[i][a] = static_cast<double>(corners.p[i][a]) * scale;
     for (int i = 0; i < 3; ++i)
@@ -55,8 +54,8 @@ inline constexpr double overlap_slack = 1.0e-14;
 /// Whether a triangle touches a closed cell that its box touches (Akenine-Moller: Fast 3D
 /// triangle-box overlap testing, 2001: separating axes), with overlap_slack. `largest` bounds the
 /// magnitude of all coordinates.
-ZKD_HOST_DEVICE
-inline bool touches(const PlacedTriangle& triangle, const Box& cell, double largest) {
+ZKD_HOST_DEVICE inline bool touches(const PlacedTriangle& triangle, const Box& cell,
+                                    double largest) {
   double half[3];
   double corner[3][3];
   for (int a = 0; a < 3; ++a) {
@@ -93,6 +92,14 @@ inline bool touches(const PlacedTriangle& triangle, const Box& cell, double larg
   return true;
 }
 
+/// Whether a box stays within a cell along the two axes other than `axis`.
+ZKD_HOST_DEVICE inline bool crosses_within(const Box& box, const Box& cell, std::uint32_t axis) {
+  bool within = true;
+  for (std::uint32_t a = 0; a < 3; ++a)
+    within = within && (a == axis || (cell.lo[a] <= box.lo[a] && box.hi[a] <= cell.hi[a]));
+  return within;
+}
+
 /// Walks the cells of a tree whose planes and links are finished, and calls visit(leaf) for every
 /// leaf cell a triangle touches, in the order of the leaves.
 struct CellWalk {
@@ -107,8 +114,7 @@ struct CellWalk {
   };
 
   template <class Visit>
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t triangle, Visit& visit) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, Visit& visit) const {
     const PlacedTriangle placed(corners_of(triangles, triangle), frame->scale);
     Entry stack[max_depth];
     std::uint32_t waiting = 0;
@@ -127,8 +133,10 @@ struct CellWalk {
         at.link = node.child[0];
         at.cell.hi[axis] = node.plane;
         if (below && above) {
-          const bool in_lower = touches(placed, at.cell, largest);
-          if (touches(placed, upper.cell, largest)) {
+          // A triangle that crosses the plane where its box lies within the cell is on both sides.
+          const bool within = crosses_within(placed.box, upper.cell, axis);
+          const bool in_lower = within || touches(placed, at.cell, largest);
+          if (within || touches(placed, upper.cell, largest)) {
             if (in_lower)
               stack[waiting++] = upper;
             else
@@ -154,11 +162,9 @@ struct CountReferences {
 
   struct Counter {
     std::uint32_t count = 0;
-    ZKD_HOST_DEVICE
-    void operator()(std::uint32_t) { ++count; }
+    ZKD_HOST_DEVICE void operator()(std::uint32_t) { ++count; }
   };
-  ZKD_HOST_DEVICE
-  std::uint32_t operator()(std::uint32_t i) const {
+  ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t i) const {
     Counter counter;
     walk(ids[i], counter);
     return counter.count;
@@ -177,14 +183,12 @@ struct WriteReferences {
     std::uint32_t* leaves;
     std::uint32_t* references;
     std::uint32_t id;
-    ZKD_HOST_DEVICE
-    void operator()(std::uint32_t leaf) {
+    ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) {
       *leaves++ = leaf;
       *references++ = id;
     }
   };
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t i) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const {
     Writer writer{leaves + offsets[i], references + offsets[i], ids[i]};
     walk(ids[i], writer);
   }
@@ -196,8 +200,7 @@ struct LeafOffset {
   const std::uint32_t* reference_count;
   std::uint32_t* offsets;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t leaf) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) const {
     offsets[leaf] = first_not_below(leaves, *reference_count, leaf);
   }
 };

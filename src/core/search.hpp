@@ -10,9 +10,8 @@
 namespace zkd::core {
 
 /// Index of the first of `count` ascending numbers that is not below `value`; `count` if none is.
-ZKD_HOST_DEVICE
-inline std::uint32_t first_not_below(const std::uint32_t* numbers, std::uint32_t count,
-                                     std::uint32_t value) {
+ZKD_HOST_DEVICE inline std::uint32_t first_not_below(const std::uint32_t* numbers,
+                                                     std::uint32_t count, std::uint32_t value) {
   std::uint32_t low = 0;
   std::uint32_t high = count;
   while (low < high) {
@@ -26,17 +25,15 @@ inline std::uint32_t first_not_below(const std::uint32_t* numbers, std::uint32_t
 }
 
 /// Index of the last of `count` ascending numbers that is at most `value`; the first is.
-ZKD_HOST_DEVICE
-inline std::uint32_t last_at_or_before(const std::uint32_t* numbers, std::uint32_t count,
-                                       std::uint32_t value) {
+ZKD_HOST_DEVICE inline std::uint32_t last_at_or_before(const std::uint32_t* numbers,
+                                                       std::uint32_t count, std::uint32_t value) {
   return first_not_below(numbers, count, value + 1) - 1;
 }
 
 /// How far `holds(1), holds(2), ...` stays true, at most `most` steps: gallop, then bisect. Short
 /// runs are found in few steps.
 template <class Predicate>
-ZKD_HOST_DEVICE
-inline std::uint32_t run_length(std::uint32_t most, const Predicate& holds) {
+ZKD_HOST_DEVICE inline std::uint32_t run_length(std::uint32_t most, const Predicate& holds) {
   std::uint32_t reached = 0;
   std::uint32_t step = 1;
   while (step <= most - reached && holds(reached + step)) {

@@ -24,8 +24,8 @@ struct Entry {
   bool hit;
 };
 
-ZKD_HOST_DEVICE
-inline Entry enter(const PreparedRay& ray, const Node& node, std::uint32_t child, Real last) {
+ZKD_HOST_DEVICE inline Entry enter(const PreparedRay& ray, const Node& node, std::uint32_t child,
+                                   Real last) {
   Real near = ray.first;
   Real far = last;
   for (int a = 0; a < 3; ++a) {
@@ -40,9 +40,8 @@ inline Entry enter(const PreparedRay& ray, const Node& node, std::uint32_t child
 
 /// Walks the tree. With `any`, stops at the first hit.
 template <bool any>
-ZKD_HOST_DEVICE
-inline Candidate traverse(const TreeView& tree, const TriangleView& triangles,
-                          const PreparedRay& ray, TraversalCost* cost) {
+ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleView& triangles,
+                                          const PreparedRay& ray, TraversalCost* cost) {
   struct Waiting {
     Link link;
     float t;
@@ -101,17 +100,15 @@ inline Candidate traverse(const TreeView& tree, const TriangleView& triangles,
 }
 
 template <bool any>
-ZKD_HOST_DEVICE
-inline Candidate trace(const TreeView& tree, const TriangleView& triangles, const Ray& ray,
-                       TraversalCost* cost) {
+ZKD_HOST_DEVICE inline Candidate trace(const TreeView& tree, const TriangleView& triangles,
+                                       const Ray& ray, TraversalCost* cost) {
   const PreparedRay prepared(tree, ray);
   if (prepared.valid) return traverse<any>(tree, triangles, prepared, cost);
   if (cost != nullptr) *cost = {};
   return {};
 }
 
-ZKD_HOST_DEVICE
-inline Hit to_hit(const Candidate& candidate) {
+ZKD_HOST_DEVICE inline Hit to_hit(const Candidate& candidate) {
   if (!candidate.found()) return {};
   return {candidate.callers_t, candidate.u, candidate.v, candidate.triangle};
 }

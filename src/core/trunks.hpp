@@ -23,14 +23,12 @@ struct BeginsTrunk {
   std::uint32_t leaf_size;
   std::uint32_t count = 0;
 
-  ZKD_HOST_DEVICE
-  void load() {
+  ZKD_HOST_DEVICE void load() {
     keys.load();
     count = *key_count;
   }
 
-  ZKD_HOST_DEVICE
-  bool operator()(std::uint32_t i) const {
+  ZKD_HOST_DEVICE bool operator()(std::uint32_t i) const {
     if (i == 0) return true;
     const std::uint32_t level = parting_level(keys[i - 1], keys[i]);
     if (level == level_count || count <= leaf_size) return false;
@@ -50,11 +48,11 @@ struct TrunkKeyOf {
   const std::uint32_t* first;
   TrunkKey* trunk_keys;
 
-  ZKD_HOST_DEVICE
-  void load() { keys.load(); }
+  ZKD_HOST_DEVICE void load() { keys.load(); }
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t trunk) const { trunk_keys[trunk] = keys[first[trunk]]; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t trunk) const {
+    trunk_keys[trunk] = keys[first[trunk]];
+  }
 };
 
 }  // namespace zkd::core

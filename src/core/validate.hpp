@@ -13,8 +13,7 @@ namespace zkd::core {
 
 inline constexpr std::uint32_t none_found = 0xFFFFFFFFu;
 
-ZKD_HOST_DEVICE
-inline void include(Box& box, const Box& other) {
+ZKD_HOST_DEVICE inline void include(Box& box, const Box& other) {
   for (int a = 0; a < 3; ++a) {
     box.lo[a] = smaller(box.lo[a], other.lo[a]);
     box.hi[a] = larger(box.hi[a], other.hi[a]);
@@ -30,8 +29,7 @@ struct ValidationReport {
   std::uint32_t first_out_of_range = none_found;
   std::uint32_t first_non_finite = none_found;
 
-  ZKD_HOST_DEVICE
-  void combine(const ValidationReport& other) {
+  ZKD_HOST_DEVICE void combine(const ValidationReport& other) {
     include(bounds, other.bounds);
     valid += other.valid;
     zero_area += other.zero_area;
@@ -46,25 +44,22 @@ struct Corners {
   const float* p[3];
 };
 
-ZKD_HOST_DEVICE
-inline Corners corners_of(const TriangleView& triangles, std::size_t triangle) {
+ZKD_HOST_DEVICE inline Corners corners_of(const TriangleView& triangles, std::size_t triangle) {
   return {{triangles.position(triangles.index(triangle, 0)),
            triangles.position(triangles.index(triangle, 1)),
            triangles.position(triangles.index(triangle, 2))}};
 }
 
-ZKD_HOST_DEVICE
-inline bool all_finite(const Corners& c) {
-  bool finite = true;
+ZKD_HOST_DEVICE inline bool all_finite(const Corners& c) {
+  std::uint32_t largest = 0;
   for (int corner = 0; corner < 3; ++corner)
-    for (int a = 0; a < 3; ++a) finite = finite && is_finite(c.p[corner][a]);
-  return finite;
+    for (int a = 0; a < 3; ++a) largest = larger(largest, bits_of(c.p[corner][a]) & 0x7FFFFFFFu);
+  return largest < 0x7F800000u;
 }
 
 /// Whether the sum of six doubles is exactly zero, by keeping every rounding error (Shewchuk 1997,
 /// grow-expansion: after each step the components add up to the exact sum and do not overlap).
-ZKD_HOST_DEVICE
-inline bool sums_to_zero(const double (&terms)[6]) {
+ZKD_HOST_DEVICE inline bool sums_to_zero(const double (&terms)[6]) {
   double expansion[6];
   int length = 0;
   for (const double term : terms) {
@@ -84,9 +79,8 @@ inline bool sums_to_zero(const double (&terms)[6]) {
 
 /// Twice the signed area of the triangle's projection along one axis: is it exactly zero?
 /// The products of two floats are exact in double.
-ZKD_HOST_DEVICE
-inline bool projection_has_zero_area(double ax, double ay, double bx, double by, double cx,
-                                     double cy) {
+ZKD_HOST_DEVICE inline bool projection_has_zero_area(double ax, double ay, double bx, double by,
+                                                     double cx, double cy) {
   const double left = (bx - ax) * (cy - ay);
   const double right = (by - ay) * (cx - ax);
   // Shewchuk's bound for the sign of the difference, (3 + 16 u) u with u = 2^-53.
@@ -98,8 +92,7 @@ inline bool projection_has_zero_area(double ax, double ay, double bx, double by,
 
 /// Exactly: corners that coincide or lie on one line. A float cross product of zero would also
 /// throw away real slivers.
-ZKD_HOST_DEVICE
-inline bool has_zero_area(const Corners& c) {
+ZKD_HOST_DEVICE inline bool has_zero_area(const Corners& c) {
   const float* a = c.p[0];
   const float* b = c.p[1];
   const float* d = c.p[2];
@@ -109,16 +102,16 @@ inline bool has_zero_area(const Corners& c) {
 }
 
 /// Whether a build takes the triangle. Its indices must be in range.
-ZKD_HOST_DEVICE
-inline bool is_valid(const Corners& c) { return all_finite(c) && !has_zero_area(c); }
+ZKD_HOST_DEVICE inline bool is_valid(const Corners& c) {
+  return all_finite(c) && !has_zero_area(c);
+}
 
 /// One triangle: writes its box (empty if left out) and adds to a report.
 struct ValidateTriangle {
   TriangleView triangles;
   Box* boxes;
 
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t triangle, ValidationReport& report) const {
+  ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {
     Box box;
     bool in_range = true;
     if (triangles.indices != nullptr)
@@ -153,8 +146,7 @@ struct ValidateTriangle {
 /// A triangle goes into the tree if its box was written as not empty.
 struct IsListed {
   const Box* boxes;
-  ZKD_HOST_DEVICE
-  bool operator()(std::uint32_t triangle) const { return !boxes[triangle].empty(); }
+  ZKD_HOST_DEVICE bool operator()(std::uint32_t triangle) const { return !boxes[triangle].empty(); }
 };
 
 }  // namespace zkd::core

@@ -54,22 +54,19 @@ template <class T>
 struct CopyTo {
   const T* from;
   T* to;
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t i) const { to[i] = from[i]; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const { to[i] = from[i]; }
 };
 
 struct Fill {
   std::uint32_t* array;
   std::uint32_t value;
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t i) const { array[i] = value; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const { array[i] = value; }
 };
 
 /// 0, 1, 2, ...
 struct Number {
   std::uint32_t* array;
-  ZKD_HOST_DEVICE
-  void operator()(std::uint32_t i) const { array[i] = i; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const { array[i] = i; }
 };
 
 }  // namespace zkd::core

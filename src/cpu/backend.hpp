@@ -168,14 +168,14 @@ class Backend {
   void climb(core::Count leaves, std::uint32_t* arrivals, Functor f) {
     threads_.share(size(leaves), grain / 4, [f, arrivals](Range range) mutable {
       load(f);
-      for (std::uint32_t leaf = range.begin; leaf < range.end; ++leaf) {
-        core::Parent parent = f.begin(leaf);
-        while (!parent.is_none()) {
-          // Releases this child's box to whoever goes on, and acquires the sibling's if that is us.
-          const std::atomic_ref<std::uint32_t> arrived(arrivals[parent.node()]);
-          if (arrived.fetch_add(1, std::memory_order_acq_rel) == 0) break;
-          parent = f.rise(parent.node());
-        }
+      // Leaves first, some at a time: an atomic operation would hold up the loads of the next leaf.
+      constexpr std::uint32_t at_a_time = 64;
+      core::Parent parents[at_a_time];
+      for (std::uint32_t leaf = range.begin; leaf < range.end;) {
+        const std::uint32_t batch = std::min(at_a_time, range.end - leaf);
+        for (std::uint32_t i = 0; i < batch; ++i) parents[i] = f.begin(leaf + i);
+        for (std::uint32_t i = 0; i < batch; ++i) climb_from(parents[i], arrivals, f);
+        leaf += batch;
       }
     });
   }
@@ -308,6 +308,17 @@ class Backend {
     for (int i = 0; i < blocks_used_; ++i) held += blocks_[i].bytes();
     most_held_ = std::max(most_held_, held);
     return block;
+  }
+
+  /// Goes up from a finished child until it is the first to arrive.
+  template <class Functor>
+  static void climb_from(core::Parent parent, std::uint32_t* arrivals, Functor& f) {
+    while (!parent.is_none()) {
+      // Releases this child's box to whoever goes on, and acquires the sibling's if that is us.
+      const std::atomic_ref<std::uint32_t> arrived(arrivals[parent.node()]);
+      if (arrived.fetch_add(1, std::memory_order_acq_rel) == 0) return;
+      parent = f.rise(parent.node());
+    }
   }
 
   static constexpr int max_blocks = 4;

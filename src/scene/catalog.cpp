@@ -112,25 +112,29 @@ json manifest_entry(const fs::path& file) {
   return nullptr;
 }
 
-glm::vec3 vector_of(const json& numbers) {
-  if (numbers.size() != 3) throw LoadError("MANIFEST.json: a camera's vector has not 3 numbers");
+glm::vec3 vector_of(const json& numbers, const fs::path& manifest) {
+  if (numbers.size() != 3) {
+    throw LoadError(manifest.string() + ": a camera's vector has not 3 numbers");
+  }
   return {numbers[0].get<float>(), numbers[1].get<float>(), numbers[2].get<float>()};
 }
 
 void read_manifest(SceneInfo& info, const fs::path& file) {
   const json entry = manifest_entry(file);
   if (entry.is_null()) return;
+  const fs::path manifest = file.parent_path() / "MANIFEST.json";
   try {
     const std::string fidelity = entry.value("fidelity", "");
     info.stand_in = info.stand_in || fidelity.find("stand-in") != std::string::npos;
     if (!fidelity.empty() && fidelity != "exact") info.note = fidelity;
     if (entry.contains("camera") && !entry["camera"].is_null()) {
       const json& camera = entry["camera"];
-      info.camera = Camera{vector_of(camera.at("eye")), vector_of(camera.at("look_at")),
-                           vector_of(camera.at("up")), camera.at("vfov_deg").get<float>()};
+      info.camera =
+          Camera{vector_of(camera.at("eye"), manifest), vector_of(camera.at("look_at"), manifest),
+                 vector_of(camera.at("up"), manifest), camera.at("vfov_deg").get<float>()};
     }
   } catch (const json::exception& error) {
-    throw LoadError((file.parent_path() / "MANIFEST.json").string() + ": " + error.what());
+    throw LoadError(manifest.string() + ": " + error.what());
   }
 }
 

@@ -313,16 +313,18 @@ Mesh fan(std::uint32_t n) {
 Mesh staircase(std::uint32_t levels) {
   require(levels <= 300, "staircase: at most 300 levels");
   Mesh mesh;
-  const double tiny = power_of_two(-static_cast<int>(levels / 3 + 4));
+  const double finest = power_of_two(-static_cast<int>((levels + 2) / 3));
   for (std::uint32_t level = 0; level <= levels; ++level) {
     // Code bit `level` from the top alone is set: coordinate 2^-(level/3 + 1) on axis level % 3.
     // The last triangle has none, code 0.
     glm::vec3 p(0.0F);
+    double place = 0.0;
     if (level < levels) {
-      p[static_cast<int>(level % 3)] =
-          static_cast<float>(power_of_two(-static_cast<int>(level / 3 + 1)));
+      place = power_of_two(-static_cast<int>(level / 3 + 1));
+      p[static_cast<int>(level % 3)] = static_cast<float>(place);
     }
-    const float d = static_cast<float>(tiny);
+    // Half a finest cell, or as small as float can tell from the place.
+    const auto d = static_cast<float>(std::max(0.5 * finest, 0x1p-22 * place));
     add(mesh, p, {p.x + d, p.y, p.z}, {p.x, p.y + d, p.z + d});
   }
   return mesh;

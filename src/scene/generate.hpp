@@ -54,7 +54,7 @@ namespace zkd::scene {
 
 /// levels + 1 tiny triangles whose Morton codes are 0, 1, 10, 100, ... on a lattice of the unit
 /// cube: each shares a longer prefix with 0 than the last, so the tree is as deep as `levels`
-/// allows. levels <= 300.
+/// allows. Codes of 63 bits tell the first 63 levels apart; the rest crowd at 0. levels <= 300.
 [[nodiscard]] Mesh staircase(std::uint32_t levels);
 
 /// Coordinates of random bits (NaN, infinity, denormals among them), indices in range.

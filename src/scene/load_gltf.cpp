@@ -147,31 +147,13 @@ class GltfCheck {
       if (comma == std::string::npos) file_.fail(name + ".uri is not base64");
       return decode_base64(std::string_view(uri).substr(comma + 8), name);
     }
-    const std::filesystem::path beside = file_.path().parent_path() / decode_percent(uri);
+    // As it stands, %20 and all: Assimp does not decode it either.
+    const std::filesystem::path beside = file_.path().parent_path() / uri;
     std::ifstream stream(beside, std::ios::binary);
     if (!stream || std::filesystem::is_directory(beside)) {
       file_.fail(name + ": " + beside.string() + " cannot be opened");
     }
     return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  }
-
-  static std::string decode_percent(const std::string& uri) {
-    const auto hex = [](char c) {
-      return c >= '0' && c <= '9'   ? c - '0'
-             : c >= 'a' && c <= 'f' ? c - 'a' + 10
-             : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                    : -1;
-    };
-    std::string text;
-    for (std::size_t i = 0; i < uri.size(); ++i) {
-      if (uri[i] == '%' && i + 2 < uri.size() && hex(uri[i + 1]) >= 0 && hex(uri[i + 2]) >= 0) {
-        text += static_cast<char>(16 * hex(uri[i + 1]) + hex(uri[i + 2]));
-        i += 2;
-      } else {
-        text += uri[i];
-      }
-    }
-    return text;
   }
 
   std::string decode_base64(std::string_view text, const std::string& name) const {

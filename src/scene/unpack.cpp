@@ -116,7 +116,7 @@ fs::path unpacked_file(const fs::path& packed) {
   // Under a name of this process first: what has the final name is always whole.
   const fs::path part = target.string() + "." + std::to_string(getpid()) + ".part";
   try {
-    run_or_fail(packed, {"zstd", "-dqf", "--long=27", "--", packed.string(), "-o", part.string()});
+    run_or_fail(packed, {"zstd", "-dqf", "--long=27", "-o", part.string(), "--", packed.string()});
   } catch (...) {
     fs::remove(part, error);
     throw;

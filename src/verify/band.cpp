@@ -12,7 +12,9 @@
 //   A_x = p_x - (d_x / d_z) * p_z, p = a - o. A_x is off by at most 4 * 2^-24 * (|p_x| +
 //   |d_x / d_z * p_z|): one rounding of p, three of the product, one of the sum. The determinant
 //   moves accordingly, which for a small triangle far away is less by orders of magnitude than
-//   2^-24 times the permanent. The band is the smaller of both, with a factor of 16 in each.
+//   2^-24 times the permanent. The band is the smaller of both, with a factor of 16 in each. A
+//   scene is brought to coordinates of 2^-16 to 2^32; each of its edge functions is then off by
+//   2 * 2^-149 at most where products underflow, 2^-116 of the square of its extent.
 // - A triangle that the ray hits by more than the band, at a t certainly between the ray's ends,
 //   must have been found: an answer beyond it (or none) is an error.
 // - A triangle that the ray misses may be answered only where the point answered, o + t * d, is on
@@ -90,10 +92,12 @@ Facts examine(const Point& o, const Point& d, const Corners& corners) {
                          a.moved[1] * std::abs(b.at[0]) + std::abs(a.at[1]) * b.moved[0] +
                          a.moved[0] * b.moved[1] + a.moved[1] * b.moved[0];
     const Determinant exact = determinant(d, p[i], p[j]);
+    const double underflow = underflow_band * std::abs(d[z]) * facts.reach * facts.reach;
+    const double rounding = std::min(determinant_band * exact.permanent, std::abs(d[z]) * moved);
     // The sign is exact; where the filter cannot tell, the value is far below any band but 0.
     const int sign = determinant_sign(d, o, corners[i], corners[j]);
     facts.edge[i] = {sign * std::abs(exact.value),
-                     std::min(determinant_band * exact.permanent, std::abs(d[z]) * moved)};
+                     exact.permanent == 0.0 ? 0.0 : rounding + underflow};
   }
 
   const PlaneHit plane = plane_hit(o, d, corners);

@@ -18,10 +18,15 @@ namespace zkd::verify {
 /// - A determinant det(d, p, q): in the band when its magnitude is below
 ///   determinant_band * permanent, the permanent being the same sum with every product taken
 ///   absolute.
+///   Where the edge functions are taken from corners sheared along the ray, as in the watertight
+///   test, the band is less: what the corners' rounding, 16 * 2^-24 of their terms, moves the
+///   determinant by. Underflow adds underflow_band * |d| * max |vertex - o|^2, less than anything
+///   a float scene can tell apart. A determinant whose products are all zero is never excused.
 /// - t = (a - o) . n / (d . n): known to t_band * max |vertex - o| * |n| / |d . n|, in units of t.
 ///   Two t differ outside the band when their difference is above the larger of their allowances.
 inline constexpr double determinant_band = 16.0 * 0x1p-24;
 inline constexpr double t_band = 16.0 * 0x1p-24;
+inline constexpr double underflow_band = 0x1p-110;
 
 /// One answer held against the oracle.
 struct Verdict {

@@ -30,8 +30,7 @@ inline Hit or_miss(const std::optional<Hit>& hit) { return hit.value_or(Hit{}); 
 inline std::string print(const Hit& hit) {
   char text[128];
   std::snprintf(text, sizeof text, "{triangle %u, t %a, u %a, v %a}", hit.triangle,
-                static_cast<double>(hit.t), static_cast<double>(hit.u),
-                static_cast<double>(hit.v));
+                static_cast<double>(hit.t), static_cast<double>(hit.u), static_cast<double>(hit.v));
   return text;
 }
 
@@ -52,8 +51,7 @@ inline std::vector<Hit> closest(const TreeView& tree, const TriangleView& triang
 }
 
 inline std::vector<Hit> brute_force(const TreeView& tree, const TriangleView& triangles,
-                                    std::span<const Ray> rays,
-                                    const cpu::Executor& executor = {}) {
+                                    std::span<const Ray> rays, const cpu::Executor& executor = {}) {
   std::vector<Hit> hits(rays.size());
   closest_hit_brute_force(executor, tree, triangles, rays, hits);
   return hits;

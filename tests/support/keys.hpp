@@ -57,7 +57,8 @@ inline Keys staircase_keys(std::uint32_t lowest_level, std::size_t times) {
 inline Keys falling_staircase_keys(std::uint32_t lowest_level) {
   Keys keys = staircase_keys(lowest_level, 1);
   const std::uint64_t code_mask = top_bits(~std::uint64_t{0}, std::min(lowest_level + 1, 64u));
-  const std::uint64_t fine_mask = lowest_level < 64 ? 0 : top_bits(~std::uint64_t{0}, lowest_level - 63);
+  const std::uint64_t fine_mask =
+      lowest_level < 64 ? 0 : top_bits(~std::uint64_t{0}, lowest_level - 63);
   for (stages::TrunkKey& key : keys) key = {~key.code & code_mask, ~key.fine & fine_mask};
   std::sort(keys.begin(), keys.end());
   return keys;

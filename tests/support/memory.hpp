@@ -38,8 +38,8 @@ class CountingResource : public std::pmr::memory_resource {
     }
     const std::size_t front = std::max(alignment, 2 * sizeof(std::size_t));
     const std::size_t size = (bytes + front + alignment - 1) / alignment * alignment;
-    auto* block = static_cast<std::byte*>(std::aligned_alloc(std::max<std::size_t>(alignment, 16),
-                                                             (size + 15) / 16 * 16));
+    auto* block = static_cast<std::byte*>(
+        std::aligned_alloc(std::max<std::size_t>(alignment, 16), (size + 15) / 16 * 16));
     if (block == nullptr) throw std::bad_alloc();
     *reinterpret_cast<std::size_t*>(block + front - sizeof(std::size_t)) = bytes;
     live_bytes_ += bytes;

@@ -117,41 +117,72 @@ inline NamedMesh small_mesh(int kind, std::uint64_t seed) {
   const std::uint32_t n = 250 + random.below(100);
   const glm::vec3 far_away = {random.one_in(2) ? 1e6F : -1e6F, 148376.0F, 0.0F};
   switch (kind) {
-    case 0: return {"soup", scene::soup(n, own)};
-    case 1: return {"grid", scene::grid(1 + random.below(3))};
-    case 2: return {"sphere", scene::sphere(random.below(3))};
-    case 3: return {"slivers 1e2", scene::slivers(n, 1e2F, own)};
-    case 4: return {"slivers 1e5", scene::slivers(n, 1e5F, own)};
-    case 5: return {"slivers 1e7", scene::slivers(n, 1e7F, own)};
-    case 6: return {"same centre", scene::same_centre(n, own)};
-    case 7: return {"flat", scene::flat(n, static_cast<int>(seed % 3), own)};
-    case 8: return {"needles", scene::needles(n / 2, own)};
-    case 9: return {"small in large 1e3", scene::small_in_large(n, 1e3F, own)};
-    case 10: return {"small in large 1e6", scene::small_in_large(n, 1e6F, own)};
-    case 11: return {"fan", scene::fan(n)};
-    case 12: return {"staircase", scene::staircase(60)};
-    case 13: return {"identical", scene::identical(n / 4)};
-    case 14: return {"integers, 2 wide", integer_mesh(n, 1, own)};
-    case 15: return {"integers, 8 wide", integer_mesh(n, 4, own)};
-    case 16: return {"grid moved by an ulp", jittered(scene::grid(3), 1, own)};
-    case 17: return {"shells an ulp apart", nested_shells(4, 1 + random.integer(0, 3))};
+    case 0:
+      return {"soup", scene::soup(n, own)};
+    case 1:
+      return {"grid", scene::grid(1 + random.below(3))};
+    case 2:
+      return {"sphere", scene::sphere(random.below(3))};
+    case 3:
+      return {"slivers 1e2", scene::slivers(n, 1e2F, own)};
+    case 4:
+      return {"slivers 1e5", scene::slivers(n, 1e5F, own)};
+    case 5:
+      return {"slivers 1e7", scene::slivers(n, 1e7F, own)};
+    case 6:
+      return {"same centre", scene::same_centre(n, own)};
+    case 7:
+      return {"flat", scene::flat(n, static_cast<int>(seed % 3), own)};
+    case 8:
+      return {"needles", scene::needles(n / 2, own)};
+    case 9:
+      return {"small in large 1e3", scene::small_in_large(n, 1e3F, own)};
+    case 10:
+      return {"small in large 1e6", scene::small_in_large(n, 1e6F, own)};
+    case 11:
+      return {"fan", scene::fan(n)};
+    case 12:
+      return {"staircase", scene::staircase(60)};
+    case 13:
+      return {"identical", scene::identical(n / 4)};
+    case 14:
+      return {"integers, 2 wide", integer_mesh(n, 1, own)};
+    case 15:
+      return {"integers, 8 wide", integer_mesh(n, 4, own)};
+    case 16:
+      return {"grid moved by an ulp", jittered(scene::grid(3), 1, own)};
+    case 17:
+      return {"shells an ulp apart", nested_shells(4, 1 + random.integer(0, 3))};
     case 18: {
       scene::Mesh once = scene::soup(n / 2, own);
       return {"duplicates", scene::joined(once, once)};
     }
-    case 19: return {"many scales", many_scales(n, own)};
-    case 20: return {"soup at 1e6", scene::offset(scene::soup(n, own), far_away)};
-    case 21: return {"sphere at 1.6e7", scene::offset(scene::sphere(2), glm::vec3(1.6e7F))};
-    case 22: return {"few ulps at 1e6", few_ulps(n, 1e6F, random.integer(1, 4), own)};
-    case 23: return {"soup times 2^-100", scene::scaled(scene::soup(n, own), -100)};
-    case 24: return {"soup times 2^100", scene::scaled(scene::soup(n, own), 100)};
-    case 25: return {"sphere times 2^-130", scene::scaled(scene::sphere(2), -130)};
-    case 26: return {"sphere times 2^127", scene::scaled(scene::sphere(2), 127)};
-    case 27: return {"denormals", denormals(n, 1 + random.integer(0, 9), own)};
-    case 28: return {"random bits", scene::random_bits(n, own)};
-    case 29: return {"book", book(n)};
-    case 30: return {"one triangle", scene::soup(1, own)};
-    default: return {"two triangles", scene::soup(2, own)};
+    case 19:
+      return {"many scales", many_scales(n, own)};
+    case 20:
+      return {"soup at 1e6", scene::offset(scene::soup(n, own), far_away)};
+    case 21:
+      return {"sphere at 1.6e7", scene::offset(scene::sphere(2), glm::vec3(1.6e7F))};
+    case 22:
+      return {"few ulps at 1e6", few_ulps(n, 1e6F, random.integer(1, 4), own)};
+    case 23:
+      return {"soup times 2^-100", scene::scaled(scene::soup(n, own), -100)};
+    case 24:
+      return {"soup times 2^100", scene::scaled(scene::soup(n, own), 100)};
+    case 25:
+      return {"sphere times 2^-130", scene::scaled(scene::sphere(2), -130)};
+    case 26:
+      return {"sphere times 2^127", scene::scaled(scene::sphere(2), 127)};
+    case 27:
+      return {"denormals", denormals(n, 1 + random.integer(0, 9), own)};
+    case 28:
+      return {"random bits", scene::random_bits(n, own)};
+    case 29:
+      return {"book", book(n)};
+    case 30:
+      return {"one triangle", scene::soup(1, own)};
+    default:
+      return {"two triangles", scene::soup(2, own)};
   }
 }
 

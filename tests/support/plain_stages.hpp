@@ -45,8 +45,8 @@ inline bool has_zero_area(const float* a, const float* b, const float* c) {
     const auto product = [&](const float* p, const float* q) {
       return static_cast<double>(p[i]) * static_cast<double>(q[j]);
     };
-    const std::array<double, 6> terms = {product(b, c), -product(b, a), -product(a, c),
-                                         -product(c, b), product(a, b), product(c, a)};
+    const std::array<double, 6> terms = {product(b, c),  -product(b, a), -product(a, c),
+                                         -product(c, b), product(a, b),  product(c, a)};
     if (!exact_sum_is_zero(terms)) return false;
   }
   return true;
@@ -145,8 +145,7 @@ inline Link plain_compression(std::span<const stages::TrunkKey> keys, std::size_
   return Link::node(node);
 }
 
-inline Link plain_compression(std::span<const stages::TrunkKey> keys,
-                              std::vector<Link>& children) {
+inline Link plain_compression(std::span<const stages::TrunkKey> keys, std::vector<Link>& children) {
   children.assign(keys.empty() ? 0 : 2 * (keys.size() - 1), Link{});
   return keys.empty() ? Link{} : plain_compression(keys, 0, keys.size(), 0, children);
 }

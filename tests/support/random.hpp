@@ -42,8 +42,8 @@ class Random : public scene::Random {
 
 /// The float `steps` representable values above (below, if negative) x.
 inline float ulps(float x, int steps) {
-  const float towards = steps < 0 ? -std::numeric_limits<float>::infinity()
-                                  : std::numeric_limits<float>::infinity();
+  const float towards =
+      steps < 0 ? -std::numeric_limits<float>::infinity() : std::numeric_limits<float>::infinity();
   for (int i = steps < 0 ? -steps : steps; i > 0; --i) x = std::nextafter(x, towards);
   return x;
 }

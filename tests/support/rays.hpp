@@ -48,17 +48,28 @@ class RayMaker {
 
   Ray of_kind(int kind) {
     switch (kind) {
-      case 0: return between(around(), inside());
-      case 1: return between(around(), vertex());
-      case 2: return between(around(), on_edge());
-      case 3: return between(around(), moved(vertex(), 8));
-      case 4: return along_axis(random_.one_in(2) ? vertex() : moved(vertex(), 1));
-      case 5: return in_plane();
-      case 6: return between(around(), cell_corner());
-      case 7: return nearly_parallel();
-      case 8: return from_afar();
-      case 9: return from_surface();
-      case 10: return between(inside(), random_.one_in(2) ? vertex() : on_edge());
+      case 0:
+        return between(around(), inside());
+      case 1:
+        return between(around(), vertex());
+      case 2:
+        return between(around(), on_edge());
+      case 3:
+        return between(around(), moved(vertex(), 8));
+      case 4:
+        return along_axis(random_.one_in(2) ? vertex() : moved(vertex(), 1));
+      case 5:
+        return in_plane();
+      case 6:
+        return between(around(), cell_corner());
+      case 7:
+        return nearly_parallel();
+      case 8:
+        return from_afar();
+      case 9:
+        return from_surface();
+      case 10:
+        return between(inside(), random_.one_in(2) ? vertex() : on_edge());
       default: {  // any length of direction
         Ray ray = between(around(), on_face());
         ray.direction *= std::ldexp(1.0F, random_.integer(-60, 60)) * (1.0F + random_.unit());
