@@ -3,6 +3,7 @@
 // Results for scripts. Names here are a contract: add, never change.
 #include "json.hpp"
 
+#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include <zkd/config.hpp>
@@ -23,6 +24,15 @@ Json or_null(const std::optional<Value>& value) {
 template <class Value>
 Json unless_empty(const Value& value) {
   return value == Value{} ? Json(nullptr) : Json(value);
+}
+
+// 1.3F as 1.3, not as 1.2999999523162842.
+double shortest(float value) {
+  char text[32];
+  const std::to_chars_result end = std::to_chars(text, text + sizeof text, value);
+  double read = static_cast<double>(value);
+  std::from_chars(text, end.ptr, read);
+  return read;
 }
 
 Json json_of(const Spread& spread) {
@@ -69,7 +79,7 @@ Json json_of_options(const Result& result) {
   return {{"builder", zkd::to_string(options.builder)},
           {"quality", zkd::to_string(options.quality)},
           {"references", zkd::to_string(options.references)},
-          {"budget", options.budget},
+          {"budget", shortest(options.budget)},
           {"leaf_size", options.leaf_size},
           {"code_bits", options.code_bits},
           {"axis_order", zkd::to_string(options.axis_order)},
@@ -103,6 +113,7 @@ Json json_of(const Result& result) {
                {"backend", zkd::to_string(result.options.backend)},
                {"threads", result.threads},
                {"options", json_of_options(result)},
+               {"preempted_per_s", or_null(result.preempted_per_s)},
                {"build_ms", json_of(result.build_ms)}};
 
   Json& stages = json["stages_ms"] = Json::object();

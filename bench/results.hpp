@@ -106,6 +106,11 @@ struct Result {
   std::map<RayKind, Check> checks;  ///< empty without --check
   std::optional<Check> check;       ///< all kinds together
   std::vector<Peer> peers;
+
+  /// How often a second another program took a core from this one while the clock ran (involuntary
+  /// context switches): near 0 on a machine that is otherwise idle. The same for all results of a
+  /// scene, which are timed together.
+  std::optional<double> preempted_per_s;
   std::optional<double> visits_at_white;  ///< node visits at the top of the heat map's scale
 };
 

@@ -3,6 +3,8 @@
 // One scene measured: what is timed, in which order, and what is found out besides.
 #include "run.hpp"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -41,6 +43,13 @@ Spread spread_of(Samples samples) {
 // Worker threads of OpenMP and of TBB spin for a while after their work and would take the cores
 // from whoever is timed next.
 void let_workers_sleep() { std::this_thread::sleep_for(std::chrono::milliseconds(10)); }
+
+// Involuntary context switches of all threads so far.
+std::int64_t preemptions() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_nivcsw;
+}
 
 struct Workload {
   std::map<RayKind, std::vector<Ray>> rays;
@@ -228,6 +237,8 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
   for (const auto& contender : ours) entrants.emplace_back(*contender);
   for (const auto& contender : peers) entrants.emplace_back(*contender);
 
+  const Stopwatch timing;
+  const std::int64_t preempted_before = preemptions();
   {
     scene::Progress progress("timing " + info.name, (options.repeat + 1) * entrants.size());
     for (unsigned repetition = 0; repetition <= options.repeat; ++repetition) {
@@ -237,6 +248,9 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
       }
     }
   }
+
+  const double preempted_per_s =
+      static_cast<double>(preemptions() - preempted_before) / (1e-3 * timing.ms());
 
   std::vector<Peer> timed_peers;
   for (std::size_t i = 0; i < peers.size(); ++i) {
@@ -255,7 +269,13 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
   peers.clear();
 
   std::optional<verify::Oracle> oracle;
-  if (options.check > 0) oracle.emplace(triangles);
+  if (options.check > 0) {
+    // A loop over all triangles is the oracle's choice for small meshes; with many rays it is long.
+    const bool many =
+        static_cast<double>(options.check) * static_cast<double>(triangles.triangle_count) > 1e8;
+    oracle.emplace(triangles,
+                   many ? verify::Oracle::Search::box_tree : verify::Oracle::Search::automatic);
+  }
   const bool closed = options.check > 0 && is_closed(mesh);
 
   for (std::size_t setting = 0; setting < results.size(); ++setting) {
@@ -270,6 +290,7 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
       known.ms = trace.ms;
     }
     result.peers = timed_peers;
+    result.preempted_per_s = preempted_per_s;
 
     if (!oracle && !options.images) continue;
     ours[setting]->build();

@@ -148,6 +148,16 @@ void print_footnotes(std::ostream& out, const std::vector<Result>& results) {
                                  [](const Result& result) { return result.paper_ms > 0.0; });
   if (paper) lines.insert(lines.begin(), "GTX 580: build times of the paper, on that GPU");
   for (const std::string& line : lines) out << line << '\n';
+
+  constexpr double busy = 30.0;  // an idle machine shows a few
+  double preempted = 0.0;
+  for (const Result& result : results) {
+    preempted = std::max(preempted, result.preempted_per_s.value_or(0.0));
+  }
+  if (preempted > busy) {
+    out << "The machine was busy: other programs took a core up to " << number(preempted)
+        << " times a second.\nThese times are too long; measure again when it is idle.\n";
+  }
 }
 
 void print_spread(std::ostream& out, const std::vector<Result>& results) {

@@ -206,8 +206,8 @@ TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
   EXPECT_EQ(json["results"][1]["options"]["references"], "all");
   for (const Json& result : json["results"]) {
     expect_keys(result, {"scene", "triangles", "stand_in", "skipped_triangles", "backend",
-                         "threads", "options", "build_ms", "stages_ms", "allocated_bytes", "tree",
-                         "trace", "check", "skipped", "peers"});
+                         "threads", "options", "preempted_per_s", "build_ms", "stages_ms",
+                         "allocated_bytes", "tree", "trace", "check", "skipped", "peers"});
     EXPECT_EQ(result["scene"], "tetra");
     EXPECT_EQ(result["triangles"], 4);
     EXPECT_EQ(result["stand_in"], false);

@@ -72,12 +72,12 @@ BuildOptions options_for(References references, std::uint64_t seed) {
   return options;
 }
 
-class QueryBruteForce : public testing::TestWithParam<int> {};
+class QueryBruteForce : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
   Count count;
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    const test::NamedMesh m = test::small_mesh(GetParam(), seed);
+    const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
     for (const References references : {References::once, References::all}) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references));
       const Tree tree = build(m.mesh.view(), options_for(references, seed));
@@ -99,7 +99,7 @@ TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
 // Rays whose ends are at a hit exactly, or an ulp beside it.
 TEST_P(QueryBruteForce, EndsOfTheIntervalAtTheHit) {
   Count count;
-  const test::NamedMesh m = test::small_mesh(GetParam(), 50);
+  const test::NamedMesh m = test::small_mesh(GetParam().number, 50);
   for (const References references : {References::once, References::all}) {
     SCOPED_TRACE(m.name + ", " + to_string(references));
     const Tree tree = build(m.mesh.view(), options_for(references, 50));
@@ -122,14 +122,8 @@ TEST_P(QueryBruteForce, EndsOfTheIntervalAtTheHit) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Every, QueryBruteForce, testing::Range(0, test::small_mesh_kinds),
-                         [](const auto& kind) {
-                           std::string name = test::small_mesh(kind.param, 1).name;
-                           for (char& c : name) {
-                             if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-                           }
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Every, QueryBruteForce, testing::ValuesIn(test::every_mesh_kind()),
+                         [](const auto& kind) { return kind.param.name(); });
 
 TEST(QueryBruteForce, LargerScenes) {
   Count count;

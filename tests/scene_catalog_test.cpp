@@ -131,13 +131,16 @@ TEST_F(CatalogTest, PackedFiles) {
   std::filesystem::remove_all(info.path.parent_path());
 
   const auto broken = write("bunny.ply.zst", "not packed at all");
-  EXPECT_EQ(error_of("bunny"), broken.string() + ": cannot be unpacked: zstd ended with status 1");
+  const std::string error = error_of("bunny");
+  EXPECT_EQ(error.find(broken.string() + ": cannot be unpacked: zstd: "), 0U) << error;
+  EXPECT_NE(error.find("unsupported format"), std::string::npos) << error;
+  EXPECT_EQ(error.find('\n'), std::string::npos) << error;
   std::vector<std::string> problems;
   for (const scene::SceneInfo& found : scene::list_scenes(&problems)) {
     EXPECT_NE(found.name, "bunny");
   }
   ASSERT_FALSE(problems.empty());
-  EXPECT_EQ(problems[0], error_of("bunny"));
+  EXPECT_EQ(problems[0], error);
 }
 
 TEST(SharedCatalog, PaperScenes) {

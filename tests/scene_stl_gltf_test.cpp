@@ -222,6 +222,7 @@ TEST_F(GltfTest, BrokenJson) {
   };
   expect_error("a.gltf", "{\"asset\" 3}", ": byte 9: malformed JSON");
   expect_error("a.gltf", "[]", ": the file has no asset");
+  expect_error("a.gltf", "[1e999]", ": byte 0: a number in the JSON is out of range");
   with("\"2.0\"", "\"1.0\"", ": asset.version is not 2.x");
   with("\"scene\":0", "\"scene\":3", ": scenes[3] is named and not there");
   with("\"scene\":0", "\"scene\":-1", ": the file.scene is no whole number");

@@ -25,13 +25,14 @@ namespace {
 std::atomic<std::size_t> news{0};
 }
 
-// Every operator new of this program counts.
-void* operator new(std::size_t bytes) {
+// Every operator new of this program counts. Not inlined, so that a compiler sees pairs of new and
+// delete where there are some.
+[[gnu::noinline]] void* operator new(std::size_t bytes) {
   ++news;
   if (void* block = std::malloc(bytes == 0 ? 1 : bytes)) return block;
   throw std::bad_alloc();
 }
-void* operator new(std::size_t bytes, std::align_val_t alignment) {
+[[gnu::noinline]] void* operator new(std::size_t bytes, std::align_val_t alignment) {
   ++news;
   const auto a = static_cast<std::size_t>(alignment);
   if (void* block = std::aligned_alloc(a, (bytes + a - 1) / a * a + (bytes == 0 ? a : 0))) {
@@ -39,10 +40,12 @@ void* operator new(std::size_t bytes, std::align_val_t alignment) {
   }
   throw std::bad_alloc();
 }
-void operator delete(void* block) noexcept { std::free(block); }
-void operator delete(void* block, std::size_t) noexcept { std::free(block); }
-void operator delete(void* block, std::align_val_t) noexcept { std::free(block); }
-void operator delete(void* block, std::size_t, std::align_val_t) noexcept { std::free(block); }
+[[gnu::noinline]] void operator delete(void* block) noexcept { std::free(block); }
+[[gnu::noinline]] void operator delete(void* block, std::size_t) noexcept { std::free(block); }
+[[gnu::noinline]] void operator delete(void* block, std::align_val_t) noexcept { std::free(block); }
+[[gnu::noinline]] void operator delete(void* block, std::size_t, std::align_val_t) noexcept {
+  std::free(block);
+}
 
 namespace zkd {
 namespace {
@@ -93,8 +96,7 @@ TEST(TreeMemory, NothingIsAllocatedElsewhere) {
       {
         const Tree tree = build(executor, m.mesh.view(), options);
         EXPECT_EQ(news - before, 0u) << "operator new was called";
-        EXPECT_EQ(memory.live_blocks(), tree.view().empty() ? memory.live_blocks() : 1u);
-        EXPECT_LE(memory.live_blocks(), 1u);
+        EXPECT_LE(memory.live_blocks(), 2u) << "nodes with leaf offsets, references";
         EXPECT_EQ(memory.live_bytes(), tree.statistics().tree_bytes);
       }
       EXPECT_EQ(memory.live_bytes(), 0u);
@@ -323,10 +325,11 @@ TEST(TreeMemory, MovesLeaveAnEmptyTreeAndFreeTheOldOne) {
     EXPECT_TRUE(first.view().empty());  // NOLINT(bugprone-use-after-move): documented as empty
     EXPECT_FALSE(closest_hit(first.view(), mesh.view(), {{0, 0, -9}}).has_value());
 
+    const std::size_t one_tree = memory.live_bytes();
     Tree third = build({.memory = &memory}, scene::soup(500, 39).view());
     third = std::move(second);
     EXPECT_EQ(tree_hash(third.view()), hash);
-    EXPECT_EQ(memory.live_blocks(), 1u) << "the tree that was there before";
+    EXPECT_EQ(memory.live_bytes(), one_tree) << "the tree that was there before";
     third = Tree();
     EXPECT_EQ(memory.live_blocks(), 0u);
     Tree& alias = third;

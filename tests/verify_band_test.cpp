@@ -292,12 +292,13 @@ TEST(VerifyBand, AWatertightIntersectorInFloatStaysWithin) {
   // Kinds whose floats neither overflow nor lose digits in a plain intersector.
   std::uint64_t mistakes = 0;
   std::uint64_t hits = 0;
-  for (const int kind : {0, 1, 2, 6, 7, 9, 11, 14, 15, 16, 17, 18, 19, 29}) {
+  for (const int kind :
+       {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 15, 16, 17, 18, 19, 20, 21, 22, 29}) {
     const test::NamedMesh named = test::small_mesh(kind, 5);
     TreeView bounds;
     bounds.bounds = scene::bounds(named.mesh);
     test::RayMaker maker(named.mesh, bounds, static_cast<std::uint64_t>(kind));
-    const std::vector<Ray> rays = maker.all_kinds(1200);
+    const std::vector<Ray> rays = maker.all_kinds(720);
     std::vector<Hit> answers;
     for (const Ray& ray : rays) answers.push_back(woop(named.mesh, ray));
     const Oracle oracle(named.mesh.view());

@@ -65,6 +65,7 @@ ZKD_HOST_DEVICE inline double centre(const Box& box, int a) {
 struct MortonCoder {
   double inverse_cell[3];
   std::int32_t origin[3];
+  std::uint32_t code_bits;
   BitDealer dealer[3];
 
   MortonCoder() = default;
@@ -75,6 +76,29 @@ struct MortonCoder {
       origin[a] = lattice.origin[a];
       dealer[a] = BitDealer(lattice.mask[a]);
     }
+    code_bits = lattice.code_bits;
+  }
+
+  /// The first level of the lattice that has a plane which touches the closed box, or code_bits if
+  /// none has. The box lies inside the lattice.
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t first_level_across(const Box& box) const {
+    std::uint64_t differ = 0;
+    for (int a = 0; a < 3; ++a) {
+      const double lo = static_cast<double>(box.lo[a]) * inverse_cell[a];
+      const double hi = static_cast<double>(box.hi[a]) * inverse_cell[a];
+      // A box that begins on a plane touches the cell below it too, unless there is none.
+      const std::int32_t first = floor_to_int(lo) - origin[a];
+      const bool on_plane = static_cast<double>(first + origin[a]) == lo;
+      const std::int32_t below = on_plane && first > 0 ? first - 1 : first;
+      const std::int32_t last = floor_to_int(hi) - origin[a];
+      const auto cells = static_cast<std::uint32_t>(below) ^ static_cast<std::uint32_t>(last);
+      // Only the highest differing bit of an axis counts.
+      if (cells != 0) {
+        const std::uint64_t highest = std::uint64_t{1} << (63 - leading_zeros(cells));
+        differ |= dealer[a].template deal<std::uint64_t>(highest);
+      }
+    }
+    return differ != 0 ? leading_zeros(differ) - (64 - code_bits) : code_bits;
   }
 
   /// The code of a point inside the lattice, right-aligned. An axis without bits adds none.

@@ -256,16 +256,31 @@ class MortonPipeline {
       backend_.for_each(one, CloseOffsets{state_, backend_.leaf_offsets()});
       return;
     }
-    const CellWalk walk{triangles_, backend_.nodes(), &state_->root, &state_->frame};
+    auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);  // free again
+    backend_.for_each(trunks(),
+                      LabelTrunk{work.first, &state_->trunks, &state_->report.valid, trunk_of});
+    const CellWalk walk{triangles_,
+                        work.sort.values,
+                        trunk_of,
+                        work.boxes,
+                        backend_.nodes(),
+                        work.levels,
+                        work.parents_of_nodes,
+                        work.parents_of_leaves,
+                        &state_->coder,
+                        &state_->frame};
     std::uint32_t* offsets = work.sort.other_values;  // free again
-    backend_.exclusive_scan(valid(), CountReferences{walk, work.sort.values}, offsets,
+    static_assert(sizeof(TrunkKey) == remembered * sizeof(std::uint32_t));
+    auto* notes = reinterpret_cast<std::uint32_t*>(work.trunk_keys);  // no longer needed
+    backend_.exclusive_scan(valid(), CountReferences{walk, notes}, offsets,
                             &state_->references_needed);
     const Count references =
         backend_.admit_references(&state_->references_needed, &state_->references);
     ReferenceWorkspace pairs{};
     backend_.take(pairs, backend_.size(references));
-    backend_.for_each(valid(), WriteReferences{walk, work.sort.values, offsets, pairs.sort.keys,
-                                               pairs.sort.values});
+    backend_.for_each(
+        valid(), WriteReferences{walk, notes, offsets, &state_->report.valid, &state_->references,
+                                 pairs.sort.keys, pairs.sort.values});
     pairs.sort =
         backend_.radix_sort(pairs.sort, references, bits_to_count(backend_.size(trunks())));
     backend_.allocate_references(references);

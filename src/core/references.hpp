@@ -9,164 +9,221 @@
 #include <zkd/tree.hpp>
 
 #include "core/arithmetic.hpp"
+#include "core/compress.hpp"
 #include "core/key.hpp"
 #include "core/lattice.hpp"
+#include "core/morton.hpp"
 #include "core/search.hpp"
 #include "core/validate.hpp"
 
 namespace zkd::core {
 
-/// A triangle in tree space, ready for overlap tests.
-struct PlacedTriangle {
-  double corner[3][3];
-  double edge[3][3];
-  double normal[3];
-  double normal_size;  ///< sum of the magnitudes of the products that make the normal
-  Box box;
+/// Relative slack of the overlap test: a triangle is taken to touch a cell that it misses by less
+/// than about this times the largest coordinate. Rounding moves a projection by less than 2^-50 of
+/// the products that make it, so a triangle that touches is never lost.
+inline constexpr double overlap_slack = 4.0e-14;
 
-  PlacedTriangle() = default;
-  ZKD_HOST_DEVICE PlacedTriangle(const Corners& corners, double scale) {
+/// A triangle in tree space, ready for overlap tests with many cells (Akenine-Moller: Fast 3D
+/// triangle-box overlap testing, 2001): its interval on each separating axis.
+struct PlacedTriangle {
+  Box box;
+  double normal[3];
+  double offset;  ///< normal . corner
+  double normal_slack;
+  // Axis a crossed with edge i, for a padded number of edges: vectors of 4 doubles.
+  double edge[4][3];
+  double lo[3][4];
+  double hi[3][4];
+
+  /// `largest` bounds the magnitude of all coordinates of scene and cells.
+  ZKD_HOST_DEVICE PlacedTriangle(const Corners& corners, double scale, double largest) {
+    double corner[3][3];
     for (int i = 0; i < 3; ++i)
-      for (int a = 0; a < 3; ++a) corner[i][a] = static_cast<double>(corners.p[i][a]) * scale;
-    for (int i = 0; i < 3; ++i)
-      for (int a = 0; a < 3; ++a) edge[i][a] = corner[(i + 1) % 3][a] - corner[i][a];
-    normal_size = 0.0;
+      for (int a = 0; a < 3; ++a) {
+        corner[i][a] = static_cast<double>(corners.p[i][a]) * scale;
+        box.lo[a] = smaller(box.lo[a], static_cast<float>(corner[i][a]));
+        box.hi[a] = larger(box.hi[a], static_cast<float>(corner[i][a]));
+      }
+    for (int i = 0; i < 4; ++i)
+      for (int a = 0; a < 3; ++a) edge[i][a] = corner[(i + 1) % 3][a] - corner[i % 3][a];
+
+    const double slack = overlap_slack * largest;
+    offset = 0.0;
+    normal_slack = 0.0;
     for (int a = 0; a < 3; ++a) {
       const int b = (a + 1) % 3;
       const int c = (a + 2) % 3;
       const double left = edge[0][b] * edge[1][c];
       const double right = edge[0][c] * edge[1][b];
       normal[a] = left - right;
-      normal_size += magnitude(left) + magnitude(right);
-      for (int i = 0; i < 3; ++i) {
-        box.lo[a] = smaller(box.lo[a], static_cast<float>(corner[i][a]));
-        box.hi[a] = larger(box.hi[a], static_cast<float>(corner[i][a]));
+      offset += normal[a] * corner[0][a];
+      normal_slack += slack * (magnitude(left) + magnitude(right));
+      for (int i = 0; i < 4; ++i) {
+        const double* e = edge[i];
+        const double* on_edge = corner[i % 3];
+        const double* opposite = corner[(i + 2) % 3];
+        const double p = e[b] * on_edge[c] - e[c] * on_edge[b];
+        const double q = e[b] * opposite[c] - e[c] * opposite[b];
+        const double edge_slack = slack * (magnitude(e[b]) + magnitude(e[c]));
+        lo[a][i] = smaller(p, q) - edge_slack;
+        hi[a][i] = larger(p, q) + edge_slack;
       }
     }
   }
-};
 
-/// Relative slack of the overlap test: a triangle is taken to touch a cell it misses by less than
-/// this times the largest coordinate. Rounding moves a projection by less than 2^-49 of the
-/// products that make it, so a triangle that touches is never lost.
-inline constexpr double overlap_slack = 1.0e-14;
-
-/// Whether a triangle touches a closed cell that its box touches (Akenine-Moller: Fast 3D
-/// triangle-box overlap testing, 2001: separating axes), with overlap_slack. `largest` bounds the
-/// magnitude of all coordinates.
-ZKD_HOST_DEVICE inline bool touches(const PlacedTriangle& triangle, const Box& cell,
-                                    double largest) {
-  double half[3];
-  double corner[3][3];
-  for (int a = 0; a < 3; ++a) {
-    const double lo = static_cast<double>(cell.lo[a]);
-    const double hi = static_cast<double>(cell.hi[a]);
-    const double middle = 0.5 * (lo + hi);
-    half[a] = 0.5 * (hi - lo);
-    for (int i = 0; i < 3; ++i) corner[i][a] = triangle.corner[i][a] - middle;
-  }
-  const double slack = overlap_slack * largest;
-
-  double distance = 0.0;
-  double reach = 4.0 * slack * triangle.normal_size;
-  for (int a = 0; a < 3; ++a) {
-    distance += triangle.normal[a] * corner[0][a];
-    reach += half[a] * magnitude(triangle.normal[a]);
-  }
-  if (magnitude(distance) > reach) return false;
-
-  for (int i = 0; i < 3; ++i) {
-    const double* edge = triangle.edge[i];
-    const double* on_edge = corner[i];
-    const double* opposite = corner[(i + 2) % 3];
+  /// Whether the triangle touches a closed cell that its box touches, with overlap_slack.
+  [[nodiscard]] ZKD_HOST_DEVICE bool touches(const Box& cell) const {
+    double middle[3];
+    double half[3];
+    double distance = -offset;
+    double reach = normal_slack;
+    for (int a = 0; a < 3; ++a) {
+      const double low = static_cast<double>(cell.lo[a]);
+      const double high = static_cast<double>(cell.hi[a]);
+      middle[a] = 0.5 * (low + high);
+      half[a] = 0.5 * (high - low);
+      distance += normal[a] * middle[a];
+      reach += half[a] * magnitude(normal[a]);
+    }
+    if (magnitude(distance) > reach) return false;
+    bool apart = false;
     for (int a = 0; a < 3; ++a) {
       const int b = (a + 1) % 3;
       const int c = (a + 2) % 3;
-      const double p = edge[b] * on_edge[c] - edge[c] * on_edge[b];
-      const double q = edge[b] * opposite[c] - edge[c] * opposite[b];
-      const double edge_reach = half[b] * magnitude(edge[c]) + half[c] * magnitude(edge[b]) +
-                                4.0 * slack * (magnitude(edge[b]) + magnitude(edge[c]));
-      if (smaller(p, q) > edge_reach || larger(p, q) < -edge_reach) return false;
+      for (int i = 0; i < 4; ++i) {
+        const double at = edge[i][b] * middle[c] - edge[i][c] * middle[b];
+        const double radius = half[b] * magnitude(edge[i][c]) + half[c] * magnitude(edge[i][b]);
+        apart |= (lo[a][i] - at > radius) | (at - hi[a][i] > radius);
+      }
     }
+    return !apart;
   }
-  return true;
-}
+};
 
-/// Whether a box stays within a cell along the two axes other than `axis`.
-ZKD_HOST_DEVICE inline bool crosses_within(const Box& box, const Box& cell, std::uint32_t axis) {
-  bool within = true;
-  for (std::uint32_t a = 0; a < 3; ++a)
-    within = within && (a == axis || (cell.lo[a] <= box.lo[a] && box.hi[a] <= cell.hi[a]));
-  return within;
-}
+/// Notes for every triangle of a trunk, by position, which trunk that is.
+struct LabelTrunk {
+  const std::uint32_t* first;
+  const std::uint32_t* trunk_count;
+  const std::uint32_t* triangle_count;
+  std::uint32_t* trunk_of;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t trunk) const {
+    const std::uint32_t end = trunk + 1 < *trunk_count ? first[trunk + 1] : *triangle_count;
+    for (std::uint32_t i = first[trunk]; i < end; ++i) trunk_of[i] = trunk;
+  }
+};
 
 /// Walks the cells of a tree whose planes and links are finished, and calls visit(leaf) for every
-/// leaf cell a triangle touches, in the order of the leaves.
+/// leaf cell that the i-th sorted triangle touches, in the order of the leaves.
+///
+/// The walk begins at the lowest node whose cell holds the triangle's whole box: up from its own
+/// trunk to the first level that has a plane across the box. Of cells only the part inside that box
+/// matters, so none has to be known from above.
 struct CellWalk {
   TriangleView triangles;
+  const std::uint32_t* ids;
+  const std::uint32_t* trunk_of;
+  const Box* boxes;
   const Node* nodes;
-  const Link* root;
+  const std::uint8_t* levels;
+  const Parent* parents_of_nodes;
+  const Parent* parents_of_leaves;
+  const MortonCoder* coder;
   const SceneFrame* frame;
 
-  struct Entry {
-    Link link;
-    Box cell;
+  [[nodiscard]] ZKD_HOST_DEVICE Link start(std::uint32_t i) const {
+    std::uint32_t across = coder->first_level_across(boxes[ids[i]]);
+    if (across == coder->code_bits) across = first_fine_level;
+    Link link = Link::leaf(trunk_of[i]);
+    Parent parent = parents_of_leaves[trunk_of[i]];
+    while (!parent.is_none() && levels[parent.node()] >= across) {
+      link = Link::node(parent.node());
+      parent = parents_of_nodes[parent.node()];
+    }
+    return link;
+  }
+
+  /// A node or leaf still to be visited. Without initialisers: a stack of them costs nothing.
+  struct Waiting {
+    std::uint32_t link;
+    float lo[3];
+    float hi[3];
   };
 
   template <class Visit>
-  ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, Visit& visit) const {
-    const PlacedTriangle placed(corners_of(triangles, triangle), frame->scale);
-    Entry stack[max_depth];
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i, Visit& visit) const {
+    const PlacedTriangle placed(corners_of(triangles, ids[i]), frame->scale, frame->largest);
+    Waiting stack[max_depth];
     std::uint32_t waiting = 0;
-    const double largest = frame->largest;
-    Entry at{*root, frame->bounds};
+    Link link = start(i);
+    Box cell = placed.box;  // of the node, cut to the box
     for (;;) {
       bool dead_end = false;
-      while (!at.link.is_leaf() && !dead_end) {
-        const Node& node = nodes[at.link.index()];
-        const std::uint32_t axis = node.axis;
-        const bool below = placed.box.lo[axis] <= node.plane;
-        const bool above = placed.box.hi[axis] >= node.plane;
-        Entry upper = at;
-        upper.link = node.child[1];
-        upper.cell.lo[axis] = node.plane;
-        at.link = node.child[0];
-        at.cell.hi[axis] = node.plane;
-        if (below && above) {
-          // A triangle that crosses the plane where its box lies within the cell is on both sides.
-          const bool within = crosses_within(placed.box, upper.cell, axis);
-          const bool in_lower = within || touches(placed, at.cell, largest);
-          if (within || touches(placed, upper.cell, largest)) {
-            if (in_lower)
-              stack[waiting++] = upper;
-            else
-              at = upper;
-          } else {
-            dead_end = !in_lower;
-          }
-        } else if (above) {
-          at = upper;
+      while (!link.is_leaf() && !dead_end) {
+        const Node& node = nodes[link.index()];
+        const bool below = placed.box.lo[node.axis] <= node.plane;
+        const bool above = placed.box.hi[node.axis] >= node.plane;
+        if (!(below && above)) {
+          link = node.child[above ? 1 : 0];
+          continue;
         }
+        Box lower = cell;
+        Box upper = cell;
+        bool within = true;
+        for (std::uint32_t a = 0; a < 3;
+             ++a) {  // no indexing by a variable: boxes stay in registers
+          const bool split = a == node.axis;
+          lower.hi[a] = split ? node.plane : cell.hi[a];
+          upper.lo[a] = split ? node.plane : cell.lo[a];
+          within = within &&
+                   (split || (cell.lo[a] == placed.box.lo[a] && cell.hi[a] == placed.box.hi[a]));
+        }
+        // A triangle that crosses a plane where nothing of it is cut off is on both sides.
+        const bool in_lower = within || placed.touches(lower);
+        const bool in_upper = within || placed.touches(upper);
+        if (in_lower && in_upper) {
+          Waiting& later = stack[waiting++];
+          later.link = node.child[1].bits;
+          for (int a = 0; a < 3; ++a) {
+            later.lo[a] = upper.lo[a];
+            later.hi[a] = upper.hi[a];
+          }
+        }
+        link = node.child[in_lower ? 0 : 1];
+        cell = in_lower ? lower : upper;
+        dead_end = !in_lower && !in_upper;
       }
-      if (!dead_end) visit(at.link.index());
+      if (!dead_end) visit(link.index());
       if (waiting == 0) return;
-      at = stack[--waiting];
+      const Waiting& next = stack[--waiting];
+      link = Link{next.link};
+      for (int a = 0; a < 3; ++a) {
+        cell.lo[a] = next.lo[a];
+        cell.hi[a] = next.hi[a];
+      }
     }
   }
 };
 
-/// How many leaves list the i-th sorted triangle.
+/// Leaves of a triangle that are remembered while counting, so that most triangles need one walk.
+inline constexpr std::uint32_t remembered = 4;
+
+/// How many leaves list the i-th sorted triangle; notes the first of them.
 struct CountReferences {
   CellWalk walk;
-  const std::uint32_t* ids;
+  std::uint32_t* notes;  ///< `remembered` leaves per triangle
 
   struct Counter {
+    std::uint32_t* notes;
     std::uint32_t count = 0;
-    ZKD_HOST_DEVICE void operator()(std::uint32_t) { ++count; }
+    ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) {
+      if (count < remembered) notes[count] = leaf;
+      ++count;
+    }
   };
   ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t i) const {
-    Counter counter;
-    walk(ids[i], counter);
+    Counter counter{notes + std::size_t{i} * remembered};
+    walk(i, counter);
     return counter.count;
   }
 };
@@ -174,8 +231,10 @@ struct CountReferences {
 /// Writes the (leaf, triangle) pairs of the i-th sorted triangle.
 struct WriteReferences {
   CellWalk walk;
-  const std::uint32_t* ids;
+  const std::uint32_t* notes;
   const std::uint32_t* offsets;
+  const std::uint32_t* triangle_count;
+  const std::uint32_t* reference_count;
   std::uint32_t* leaves;
   std::uint32_t* references;
 
@@ -189,8 +248,13 @@ struct WriteReferences {
     }
   };
   ZKD_HOST_DEVICE void operator()(std::uint32_t i) const {
-    Writer writer{leaves + offsets[i], references + offsets[i], ids[i]};
-    walk(ids[i], writer);
+    Writer writer{leaves + offsets[i], references + offsets[i], walk.ids[i]};
+    const std::uint32_t end = i + 1 < *triangle_count ? offsets[i + 1] : *reference_count;
+    const std::uint32_t count = end - offsets[i];
+    if (count <= remembered)
+      for (std::uint32_t r = 0; r < count; ++r) writer(notes[std::size_t{i} * remembered + r]);
+    else
+      walk(i, writer);
   }
 };
 

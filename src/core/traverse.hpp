@@ -42,8 +42,8 @@ ZKD_HOST_DEVICE inline Entry enter(const PreparedRay& ray, const Node& node, std
 template <bool any>
 ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleView& triangles,
                                           const PreparedRay& ray, TraversalCost* cost) {
-  struct Waiting {
-    Link link;
+  struct Waiting {  // without initialisers: a stack of them costs nothing
+    std::uint32_t link;
     float t;
   };
   Waiting stack[max_depth];
@@ -65,7 +65,7 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
         const bool upper_first =
             upper.t < lower.t || (upper.t == lower.t && ray.negative[node.axis] != 0);
         const std::uint32_t near = upper_first ? 1 : 0;
-        stack[waiting++] = {node.child[1 - near], upper_first ? lower.t : upper.t};
+        stack[waiting++] = {node.child[1 - near].bits, upper_first ? lower.t : upper.t};
         link = node.child[near];
       } else if (lower.hit) {
         link = node.child[0];
@@ -94,7 +94,7 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
         if (cost != nullptr) *cost = {node_visits, triangle_tests};
         return best;
       }
-      link = stack[--waiting].link;
+      link = Link{stack[--waiting].link};
     } while (stack[waiting].t > best.t.value);
   }
 }

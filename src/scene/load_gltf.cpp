@@ -87,6 +87,8 @@ class GltfCheck {
     } catch (const json::parse_error& error) {
       const std::size_t at = error.byte > 0 ? error.byte - 1 : 0;
       file_.fail_at_byte(text_at + at, "malformed JSON");
+    } catch (const json::out_of_range&) {
+      file_.fail_at_byte(text_at, "a number in the JSON is out of range");
     }
   }
 

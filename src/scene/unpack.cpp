@@ -4,18 +4,17 @@
 #include "scene/unpack.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <vector>
 
 #include "scene/load.hpp"
@@ -28,49 +27,55 @@ namespace fs = std::filesystem;
 
 fs::path unpack_folder() { return fs::path(ZKD_BUILD_DIR) / "scenes"; }
 
-/// Runs a program to its end: its exit status, or -1 with errno when it cannot be started. Its
-/// output is dropped (tools print results there), its errors are seen.
-int run(const std::vector<std::string>& command, const std::string& label) {
-  std::vector<char*> arguments;
-  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  pid_t child = 0;
-  const int error =
-      posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) {
-    errno = error;
-    return -1;
-  }
-  Progress progress(label, 0);
-  int status = 0;
-  while (true) {
-    const pid_t ended = waitpid(child, &status, WNOHANG);
-    if (ended == child) return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    if (ended < 0 && errno != EINTR) return -1;
-    progress.advance(0);
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-}
-
 [[noreturn]] void fail(const fs::path& packed, const std::string& why) {
   throw LoadError(packed.string() + ": cannot be unpacked: " + why);
 }
 
-void run_or_fail(const fs::path& packed, const std::vector<std::string>& command) {
-  const int status = run(command, "unpacking " + packed.filename().string());
-  if (status == 0) return;
-  if (status < 0) {
-    const std::string reason = std::strerror(errno);
-    fail(packed,
-         command[0] + ": " + reason + (command[0] == "zstd" ? " (Debian package zstd)" : ""));
+/// Runs a program on behalf of `packed`, to its end. Its output is dropped (tools print results
+/// there); when it fails, the last line of what it said on stderr becomes the error.
+void run(const fs::path& packed, const std::vector<std::string>& command) {
+  std::vector<char*> arguments;
+  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+
+  int said[2];
+  if (pipe2(said, O_CLOEXEC) != 0) fail(packed, std::strerror(errno));
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, said[1], STDERR_FILENO);
+  pid_t child = 0;
+  const int error =
+      posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  close(said[1]);
+  if (error != 0) {
+    close(said[0]);
+    const char* hint = command[0] == "zstd" ? " (Debian package zstd)" : "";
+    fail(packed, command[0] + ": " + std::strerror(error) + hint);
   }
-  fail(packed, command[0] + " ended with status " + std::to_string(status));
+
+  // Until the pipe is closed, which is when the program ends.
+  Progress progress("unpacking " + packed.filename().string(), 0);
+  std::string words;
+  pollfd waiting{said[0], POLLIN, 0};
+  for (ssize_t size = 1; size != 0;) {
+    progress.advance(0);
+    if (poll(&waiting, 1, 100) <= 0) continue;
+    char buffer[512];
+    size = read(said[0], buffer, sizeof(buffer));
+    if (size < 0 && errno != EINTR) break;
+    if (size > 0) words.append(buffer, static_cast<std::size_t>(size));
+  }
+  close(said[0]);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  while (!words.empty() && (words.back() == '\n' || words.back() == ' ')) words.pop_back();
+  words.erase(0, words.rfind('\n') + 1);
+  fail(packed, words.empty() ? command[0] + " failed" : words);
 }
 
 void make_folder(const fs::path& packed, const fs::path& folder) {
@@ -116,7 +121,7 @@ fs::path unpacked_file(const fs::path& packed) {
   // Under a name of this process first: what has the final name is always whole.
   const fs::path part = target.string() + "." + std::to_string(getpid()) + ".part";
   try {
-    run_or_fail(packed, {"zstd", "-dqf", "--long=27", "-o", part.string(), "--", packed.string()});
+    run(packed, {"zstd", "-dqf", "--long=27", "-o", part.string(), "--", packed.string()});
   } catch (...) {
     fs::remove(part, error);
     throw;
@@ -136,7 +141,7 @@ fs::path unpacked_by_script(const fs::path& packed) {
     return target;
   }
   make_folder(packed, folder);
-  run_or_fail(packed, {(source / "unpack.sh").string(), folder.string()});
+  run(packed, {(source / "unpack.sh").string(), folder.string()});
   if (!fs::is_regular_file(target, error))
     fail(packed, "unpack.sh did not make " + target.string());
   return target;

@@ -33,6 +33,9 @@
 namespace zkd::verify {
 namespace {
 
+// What a t next to zero is rounded by when it is answered as a float.
+constexpr double smallest_float = 0x1p-149;
+
 double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double length(const Point& a) { return std::sqrt(dot(a, a)); }
 
@@ -105,7 +108,8 @@ Facts examine(const Point& o, const Point& d, const Corners& corners) {
       determinant(d, difference(corners[1], corners[0]), difference(corners[2], corners[0]));
   facts.along = {plane.denominator, determinant_band * along.permanent};
   facts.t = plane.t;
-  facts.t_allowance = t_band * facts.reach * plane.normal / std::abs(plane.denominator);
+  facts.t_allowance =
+      t_band * facts.reach * plane.normal / std::abs(plane.denominator) + smallest_float;
   return facts;
 }
 
@@ -165,7 +169,8 @@ bool may_be_invented(const Facts& facts, const Ray& ray, const Hit& hit, const C
   const auto t = static_cast<double>(hit.t);
   const Corners seen = {difference(corners[0], o), difference(corners[1], o),
                         difference(corners[2], o)};
-  return distance({t * d[0], t * d[1], t * d[2]}, seen) <= 2.0 * t_band * facts.reach;
+  return distance({t * d[0], t * d[1], t * d[2]}, seen) <=
+         2.0 * t_band * facts.reach + smallest_float * length(d);
 }
 
 // The float ulp at x.
@@ -231,6 +236,7 @@ Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ra
       if (!may_be_invented(facts, ray, hit, corners)) return verdict;
       // Its plane may be nearly along the ray and say nothing of t: the t answered counts.
       chosen = static_cast<double>(hit.t);
+      allowance = smallest_float;
     }
   }
 

@@ -22,7 +22,8 @@ namespace zkd::verify {
 ///   test, the band is less: what the corners' rounding, 16 * 2^-24 of their terms, moves the
 ///   determinant by. Underflow adds underflow_band * |d| * max |vertex - o|^2, less than anything
 ///   a float scene can tell apart. A determinant whose products are all zero is never excused.
-/// - t = (a - o) . n / (d . n): known to t_band * max |vertex - o| * |n| / |d . n|, in units of t.
+/// - t = (a - o) . n / (d . n): known to t_band * max |vertex - o| * |n| / |d . n|, in units of t,
+///   and to the smallest float.
 ///   Two t differ outside the band when their difference is above the larger of their allowances.
 inline constexpr double determinant_band = 16.0 * 0x1p-24;
 inline constexpr double t_band = 16.0 * 0x1p-24;

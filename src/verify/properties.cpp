@@ -38,7 +38,8 @@ ExactBox box_of(const Corners& corners) {
   return box;
 }
 
-// Whether the tree's float is x; where scaling took x out of the floats, whether it is a neighbour.
+// Whether the tree's float is x; where scaling took x out of the floats, whether it is one of the
+// two floats about x.
 bool is_nearly(float stored, double x) {
   const auto exact = static_cast<double>(stored);
   const bool lost = std::isfinite(x) && static_cast<double>(static_cast<float>(x)) != x;
@@ -390,8 +391,8 @@ class Checker {
           const float hi = tree_.nodes[index].hi(which, axis);
           const double need_lo = box.lo[static_cast<std::size_t>(axis)];
           const double need_hi = box.hi[static_cast<std::size_t>(axis)];
-          const bool contains =
-              static_cast<double>(lo) <= need_lo && static_cast<double>(hi) >= need_hi;
+          const bool contains = (static_cast<double>(lo) <= need_lo || is_nearly(lo, need_lo)) &&
+                                (static_cast<double>(hi) >= need_hi || is_nearly(hi, need_hi));
           const bool tight = strict_ || (is_nearly(lo, need_lo) && is_nearly(hi, need_hi));
           if (contains && tight) continue;
           report(5, "child ", which, " of node ", index, " has its box from ", lo, " to ", hi,

@@ -36,16 +36,23 @@ float ordinary(int whole) { return static_cast<float>(whole); }
 
 void print(const char* name, float (*coordinate)(int), zkd::References references) {
   Random random{42};
-  const auto point = [&](int around, int reach) {
-    int at[3];
-    for (int& c : at) c = around + random.below(2 * reach + 1) - reach;
-    return glm::vec3(coordinate(at[0]), coordinate(at[1]), coordinate(at[2]));
+  struct Whole {
+    int x, y, z;
+  };
+  const auto near = [&](int around, int reach) {
+    const auto one = [&] { return around + random.below(2 * reach + 1) - reach; };
+    const int x = one();
+    const int y = one();
+    return Whole{x, y, one()};
+  };
+  const auto vector = [&](Whole w) {
+    return glm::vec3(coordinate(w.x), coordinate(w.y), coordinate(w.z));
   };
 
   std::vector<glm::vec3> corners;
   for (int i = 0; i < 1000; ++i) {
     const int around = random.below(20001) - 10000;
-    for (int corner = 0; corner < 3; ++corner) corners.push_back(point(around, 4000));
+    for (int corner = 0; corner < 3; ++corner) corners.push_back(vector(near(around, 4000)));
   }
   const zkd::TriangleView triangles{corners};
 
@@ -60,9 +67,12 @@ void print(const char* name, float (*coordinate)(int), zkd::References reference
   }
 
   for (int i = 0; i < 5000; ++i) {
+    const Whole from = near(0, 30000);
+    const int diagonal = random.below(20001) - 10000;
+    const Whole to = near(diagonal, 3000);
     zkd::Ray ray;
-    ray.origin = point(0, 30000);
-    ray.direction = point(0, 10000);
+    ray.origin = vector(from);
+    ray.direction = vector({to.x - from.x, to.y - from.y, to.z - from.z});
     const auto hit = zkd::closest_hit(tree.view(), triangles, ray);
     const bool any = zkd::any_hit(tree.view(), triangles, ray);
     if (hit) {

@@ -7,12 +7,21 @@
 #include <cstdint>
 #include <cstdio>
 #include <optional>
+#include <ostream>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <zkd/geometry.hpp>
+#include <zkd/options.hpp>
 #include <zkd/query.hpp>
+
+namespace zkd {
+
+/// How GoogleTest shows a policy, in failures and in the names of cases.
+inline void PrintTo(References references, std::ostream* out) { *out << to_string(references); }
+
+}  // namespace zkd
 
 namespace zkd::test {
 

@@ -4,9 +4,11 @@
 // about 300 triangles each, any number of them by seed.
 #pragma once
 
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -184,6 +186,27 @@ inline NamedMesh small_mesh(int kind, std::uint64_t seed) {
     default:
       return {"two triangles", scene::soup(2, own)};
   }
+}
+
+/// A kind of small mesh as a GoogleTest parameter: its name is the name of the case.
+struct MeshKind {
+  int number = 0;
+
+  [[nodiscard]] std::string name() const {
+    std::string text = small_mesh(number, 1).name;
+    for (char& c : text) {
+      if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+    }
+    return text;
+  }
+};
+
+inline void PrintTo(const MeshKind& kind, std::ostream* out) { *out << kind.name(); }
+
+inline std::vector<MeshKind> every_mesh_kind() {
+  std::vector<MeshKind> all;
+  for (int kind = 0; kind < small_mesh_kinds; ++kind) all.push_back({kind});
+  return all;
 }
 
 }  // namespace zkd::test

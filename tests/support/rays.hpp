@@ -3,6 +3,7 @@
 // Rays that have ever been hard, made from the mesh and the tree they are shot at.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
