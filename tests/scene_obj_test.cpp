@@ -3,6 +3,7 @@
 // OBJ files, good and broken.
 #include <cmath>
 #include <limits>
+#include <ostream>
 
 #include "scene_files.hpp"
 
@@ -223,6 +224,8 @@ struct RealObj {
   float lo[3];
   float hi[3];
 };
+
+void PrintTo(const RealObj& obj, std::ostream* out) { *out << obj.name; }
 
 class RealObjTest : public testing::TestWithParam<RealObj> {};
 

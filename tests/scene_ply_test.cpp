@@ -68,6 +68,22 @@ TEST_F(PlyTest, TextWithCrLfAndBlankLines) {
   EXPECT_EQ(mesh.faces, faces);
 }
 
+TEST_F(PlyTest, BinaryAfterAHeaderWithCrLf) {
+  std::string head = header("binary_little_endian", 4, 2);
+  for (std::size_t at = 0; (at = head.find('\n', at)) != std::string::npos; at += 2) {
+    head.replace(at, 1, "\r\n");
+  }
+  const scene::Mesh mesh = load("a.ply", head + binary_body<float, std::uint8_t, int, false>());
+  EXPECT_EQ(mesh.positions, corners);
+  EXPECT_EQ(mesh.faces, faces);
+}
+
+// A carriage return inside a row is a blank to one reader and the end of the row to the other.
+TEST_F(PlyTest, ReadersThatDisagreeAreNotTrusted) {
+  expect_error("a.ply", header("ascii", 3, 1) + "0 0\r0\n1 0 0\n1 1 0\n3 0 1 2\n",
+               ": Assimp and zkd read vertex 1 differently; the file is not trusted");
+}
+
 TEST_F(PlyTest, BinaryInBothByteOrders) {
   const scene::Mesh little = load("a.ply", header("binary_little_endian", 4, 2) +
                                                binary_body<float, std::uint8_t, int, false>());

@@ -26,6 +26,23 @@ struct Candidate {
   [[nodiscard]] ZKD_HOST_DEVICE bool found() const { return triangle != no_triangle; }
 };
 
+/// Edge functions of the sheared corners, each twice the area opposite a corner, and their sum.
+template <class T>
+struct Edges {
+  T a;
+  T b;
+  T c;
+
+  [[nodiscard]] ZKD_HOST_DEVICE bool mixed_signs() const {
+    const T zero = T(0);
+    return (a < zero || b < zero || c < zero) && (a > zero || b > zero || c > zero);
+  }
+  [[nodiscard]] ZKD_HOST_DEVICE T determinant() const { return a + b + c; }
+};
+
+/// Below this, 2^-96, edge functions in single precision lose digits to underflow.
+inline constexpr float smallest_edge = 1.2621774e-29F;
+
 /// Replaces `best` by the hit on this triangle, if there is one in the ray's interval and nearer.
 /// Returns whether it did.
 ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& corners,
@@ -35,36 +52,48 @@ ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& cor
   Real depth[3];
   for (int i = 0; i < 3; ++i) {
     // Scaled before the origin is taken off: exact, and the same with and without fma.
-    const Real along = Real(corners.p[i][ray.k[2]]) * ray.scale - ray.sheared_origin[2];
-    x[i] =
-        fma(-ray.shear[0], along, Real(corners.p[i][ray.k[0]]) * ray.scale - ray.sheared_origin[0]);
-    y[i] =
-        fma(-ray.shear[1], along, Real(corners.p[i][ray.k[1]]) * ray.scale - ray.sheared_origin[1]);
+    const Real along = ray.from_origin(corners.p[i], 2);
+    x[i] = fma(-ray.shear[0], along, ray.from_origin(corners.p[i], 0));
+    y[i] = fma(-ray.shear[1], along, ray.from_origin(corners.p[i], 1));
     depth[i] = along;
   }
-  const Real zero = 0.0F;
-  const Real edge_a = difference_of_products(x[2], y[1], y[2], x[1]);
-  const Real edge_b = difference_of_products(x[0], y[2], y[0], x[2]);
-  const Real edge_c = difference_of_products(x[1], y[0], y[1], x[0]);
-  const bool any_negative = edge_a < zero || edge_b < zero || edge_c < zero;
-  const bool any_positive = edge_a > zero || edge_b > zero || edge_c > zero;
-  if (any_negative && any_positive) return false;
-  const Real determinant = edge_a + edge_b + edge_c;
-  if (determinant == zero) return false;
-
-  const Real scaled_t =
-      fma(edge_a, depth[0], fma(edge_b, depth[1], edge_c * depth[2])) * ray.shear[2];
-  const Real t = scaled_t / determinant;
+  const Edges<Real> edges{difference_of_products(x[2], y[1], y[2], x[1]),
+                          difference_of_products(x[0], y[2], y[0], x[2]),
+                          difference_of_products(x[1], y[0], y[1], x[0])};
+  Real t;
+  Real u;
+  Real v;
+  const float largest =
+      larger(magnitude(edges.a.value), larger(magnitude(edges.b.value), magnitude(edges.c.value)));
+  if (!(largest < smallest_edge)) {
+    if (edges.mixed_signs()) return false;
+    const Real determinant = edges.determinant();
+    if (determinant == Real(0.0F)) return false;
+    t = fma(edges.a, depth[0], fma(edges.b, depth[1], edges.c * depth[2])) * ray.shear[2] /
+        determinant;
+    u = edges.b / determinant;
+    v = edges.c / determinant;
+  } else {
+    // Products of floats are exact in double, so signs are again.
+    const Wide wx[3] = {x[0].value, x[1].value, x[2].value};
+    const Wide wy[3] = {y[0].value, y[1].value, y[2].value};
+    const Edges<Wide> wide{wx[2] * wy[1] - wy[2] * wx[1], wx[0] * wy[2] - wy[0] * wx[2],
+                           wx[1] * wy[0] - wy[1] * wx[0]};
+    if (wide.mixed_signs()) return false;
+    const Wide determinant = wide.determinant();
+    if (!(determinant < Wide(0.0)) && !(determinant > Wide(0.0))) return false;
+    const Wide sum = wide.a * Wide(depth[0].value) + wide.b * Wide(depth[1].value) +
+                     wide.c * Wide(depth[2].value);
+    t = static_cast<float>((sum * Wide(ray.shear[2].value) / determinant).value);
+    u = static_cast<float>((wide.b / determinant).value);
+    v = static_cast<float>((wide.c / determinant).value);
+  }
   // Written so that NaN, from coordinates that are not finite, is never accepted.
   if (!(t <= best.t)) return false;
   if (t == best.t && !(id < best.triangle)) return false;
   const float callers_t = ray.callers_t(t);
   if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
-  best.t = t;
-  best.callers_t = callers_t;
-  best.u = (edge_b / determinant).value;
-  best.v = (edge_c / determinant).value;
-  best.triangle = id;
+  best = {t, callers_t, u.value, v.value, id};
   return true;
 }
 

@@ -26,10 +26,12 @@ inline constexpr double far_origin = 8.0;
 struct PreparedRay {
   // In tree space. Axis kz is the one along which the direction is longest; kx, ky follow it.
   Real origin[3];
-  Real inverse[3];         ///< of the direction; large instead of infinite
-  Real padding[3];         ///< half-width of a plane, in units of t
-  Real shear[3];           ///< direction[kx] / direction[kz], [ky] / [kz], 1 / [kz]
-  Real sheared_origin[3];  ///< origin in the order kx, ky, kz
+  Real inverse[3];          ///< of the direction; large instead of infinite
+  Real padding[3];          ///< half-width of a plane, in units of t
+  Real shear[3];            ///< direction[kx] / direction[kz], [ky] / [kz], 1 / [kz]
+  Real permuted_origin[3];  ///< origin in the order kx, ky, kz
+  Real permuted_rest[3];    ///< what rounding a moved origin to float took off it
+  bool moved = false;
   std::uint32_t k[3];
   std::uint32_t negative[3];  ///< 1: the direction is negative along this axis
 
@@ -110,11 +112,21 @@ struct PreparedRay {
     shear[0] = d[k[0]] / d[k[2]];
     shear[1] = d[k[1]] / d[k[2]];
     shear[2] = Real(1.0F) / d[k[2]];
-    for (int i = 0; i < 3; ++i) sheared_origin[i] = origin[k[i]];
+    for (int i = 0; i < 3; ++i) {
+      permuted_origin[i] = origin[k[i]];
+      permuted_rest[i] =
+          static_cast<float>((from[k[i]] - Wide(static_cast<double>(origin[k[i]].value))).value);
+    }
 
     first = bound(t_min, to_tree, -1.0);
     last = bound(t_max, to_tree, 1.0);
     valid = true;
+  }
+
+  /// Coordinate k[i] of a corner, in tree space, from the ray's origin.
+  [[nodiscard]] ZKD_HOST_DEVICE Real from_origin(const float* corner, int i) const {
+    const Real difference = Real(corner[k[i]]) * scale - permuted_origin[i];
+    return moved ? difference - permuted_rest[i] : difference;
   }
 
   /// The caller's t of a hit at `t` in tree space.
@@ -134,6 +146,7 @@ struct PreparedRay {
       along = along + to_centre * direction[a];
       squared = squared + direction[a] * direction[a];
     }
+    moved = true;
     t_shift = along / squared;
     for (int a = 0; a < 3; ++a) {
       from[a] = from[a] + t_shift * direction[a];

@@ -18,30 +18,45 @@
 
 namespace zkd::core {
 
-/// Where a ray enters a child's box, and whether it does.
-struct Entry {
-  float t;
-  bool hit;
+/// Where a ray enters the boxes of a node's two children, and which of them it meets.
+struct Entries {
+  float t[2];
+  std::uint32_t hit;  ///< bit 0: child 0, bit 1: child 1
 };
 
-ZKD_HOST_DEVICE inline Entry enter(const PreparedRay& ray, const Node& node, std::uint32_t child,
-                                   Real last) {
-  Real near = ray.first;
-  Real far = last;
-  for (int a = 0; a < 3; ++a) {
-    const float* bounds = node.bounds[a];
-    const Real at_near = bounds[child + 2 * ray.negative[a]];
-    const Real at_far = bounds[child + 2 * (1 - ray.negative[a])];
-    near = larger(near, (at_near - ray.origin[a]) * ray.inverse[a] - ray.padding[a]);
-    far = smaller(far, (at_far - ray.origin[a]) * ray.inverse[a] + ray.padding[a]);
+/// A ray against the two boxes of a node. A backend may bring its own.
+class BoxTest {
+ public:
+  ZKD_HOST_DEVICE explicit BoxTest(const PreparedRay& ray) : ray_(ray) {}
+
+  /// `last`: nothing behind it is of interest any more.
+  ZKD_HOST_DEVICE Entries operator()(const Node& node, Real last) const {
+    Real near[2] = {ray_.first, ray_.first};
+    Real far[2] = {last, last};
+    for (int a = 0; a < 3; ++a) {
+      const float* at_near = node.bounds[a] + 2 * ray_.negative[a];
+      const float* at_far = node.bounds[a] + 2 - 2 * ray_.negative[a];
+      for (int child = 0; child < 2; ++child) {
+        near[child] =
+            larger(near[child],
+                   (Real(at_near[child]) - ray_.origin[a]) * ray_.inverse[a] - ray_.padding[a]);
+        far[child] = smaller(
+            far[child], (Real(at_far[child]) - ray_.origin[a]) * ray_.inverse[a] + ray_.padding[a]);
+      }
+    }
+    return {{near[0].value, near[1].value},
+            (near[0] <= far[0] ? 1u : 0u) | (near[1] <= far[1] ? 2u : 0u)};
   }
-  return {near.value, near <= far};
-}
+
+ private:
+  const PreparedRay& ray_;
+};
 
 /// Walks the tree. With `any`, stops at the first hit.
-template <bool any>
+template <bool any, class Boxes>
 ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleView& triangles,
                                           const PreparedRay& ray, TraversalCost* cost) {
+  const Boxes boxes(ray);
   struct Waiting {  // without initialisers: a stack of them costs nothing
     std::uint32_t link;
     float t;
@@ -59,18 +74,15 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
       ++node_visits;
       const Node& node = tree.nodes[link.index()];
       const Real last = smaller(ray.last, best.t);
-      const Entry lower = enter(ray, node, 0, last);
-      const Entry upper = enter(ray, node, 1, last);
-      if (lower.hit && upper.hit) {
-        const bool upper_first =
-            upper.t < lower.t || (upper.t == lower.t && ray.negative[node.axis] != 0);
+      const Entries entries = boxes(node, last);
+      if (entries.hit == 3) {
+        const bool upper_first = entries.t[1] < entries.t[0] ||
+                                 (entries.t[1] == entries.t[0] && ray.negative[node.axis] != 0);
         const std::uint32_t near = upper_first ? 1 : 0;
-        stack[waiting++] = {node.child[1 - near].bits, upper_first ? lower.t : upper.t};
+        stack[waiting++] = {node.child[1 - near].bits, entries.t[1 - near]};
         link = node.child[near];
-      } else if (lower.hit) {
-        link = node.child[0];
-      } else if (upper.hit) {
-        link = node.child[1];
+      } else if (entries.hit != 0) {
+        link = node.child[entries.hit - 1];
       } else {
         reached = false;
         break;
@@ -99,11 +111,11 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
   }
 }
 
-template <bool any>
+template <bool any, class Boxes = BoxTest>
 ZKD_HOST_DEVICE inline Candidate trace(const TreeView& tree, const TriangleView& triangles,
                                        const Ray& ray, TraversalCost* cost) {
   const PreparedRay prepared(tree, ray);
-  if (prepared.valid) return traverse<any>(tree, triangles, prepared, cost);
+  if (prepared.valid) return traverse<any, Boxes>(tree, triangles, prepared, cost);
   if (cost != nullptr) *cost = {};
   return {};
 }

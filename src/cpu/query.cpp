@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/traverse.hpp"
+#include "cpu/box_test.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/instruction_set.hpp"
 #include "cpu/threads.hpp"
@@ -20,10 +21,13 @@ template <bool any>
 core::Candidate trace_one(const TreeView& tree, const TriangleView& triangles,
                           const Ray& ray) noexcept {
   const cpu::FloatEnvironment environment;
-  const auto body = [&tree, &triangles](const Ray& one) {
-    return core::trace<any>(tree, triangles, one, nullptr);
-  };
-  return cpu::call(cpu::use_avx2(cpu::InstructionSet::automatic), body, ray);
+  if (cpu::use_avx2(cpu::InstructionSet::automatic)) {
+    const auto body = [&tree, &triangles](const Ray& one) {
+      return core::trace<any, cpu::Avx2BoxTest>(tree, triangles, one, nullptr);
+    };
+    return cpu::call_avx2(body, ray);
+  }
+  return core::trace<any>(tree, triangles, ray, nullptr);
 }
 
 template <bool any, class Write>
@@ -36,10 +40,19 @@ void trace_all(const cpu::Executor& executor, const TreeView& tree, const Triang
   constexpr std::size_t most = 1u << 30;
   for (std::size_t done = 0; done < count; done += most) {
     const auto n = static_cast<std::uint32_t>(std::min(most, count - done));
-    threads.share(n, rays_at_once, [=](cpu::Range range) {
+    const auto trace_range = [=]<class Boxes>(cpu::Range range) {
       for (std::size_t i = done + range.begin; i < done + range.end; ++i)
-        write(i, core::trace<any>(tree, triangles, rays[i], costs.empty() ? nullptr : &costs[i]));
-    });
+        write(i, core::trace<any, Boxes>(tree, triangles, rays[i],
+                                         costs.empty() ? nullptr : &costs[i]));
+    };
+    if (threads.avx2())
+      threads.share(n, rays_at_once, [=](cpu::Range range) {
+        trace_range.template operator()<cpu::Avx2BoxTest>(range);
+      });
+    else
+      threads.share(n, rays_at_once, [=](cpu::Range range) {
+        trace_range.template operator()<core::BoxTest>(range);
+      });
   }
 }
 
