@@ -320,7 +320,7 @@ TEST(ApiError, OptionsHaveTheirNames) {
   EXPECT_STREQ(to_string(Quality::high), "high");
   EXPECT_STREQ(to_string(InvalidTriangles::error), "error");
   EXPECT_STREQ(to_string(InvalidTriangles::skip), "skip");
-  EXPECT_STREQ(to_string(AxisOrder::by_extent), "by_extent");
+  EXPECT_STREQ(to_string(AxisOrder::by_extent), "extent");
   EXPECT_STREQ(to_string(AxisOrder::cyclic), "cyclic");
   EXPECT_STREQ(to_string(Stage::validate), "validate");
   EXPECT_STREQ(to_string(Stage::tight_boxes), "tight_boxes");

@@ -188,8 +188,8 @@ void expect_equal(const Answers& got, const Answers& want, const std::string& wh
   EXPECT_EQ(got.tree, want.tree) << what;
   for (std::size_t i = 0; i < want.hits.size(); ++i) {
     ASSERT_TRUE(same_bits(got.hits[i], want.hits[i])) << what << ", ray " << i;
-    ASSERT_TRUE(same_bits(got.single[i], want.hits[i])) << what << ", single ray " << i;
-    ASSERT_TRUE(same_bits(got.loop[i], want.hits[i])) << what << ", brute force, ray " << i;
+    ASSERT_TRUE(same_bits(got.single[i], want.single[i])) << what << ", single ray " << i;
+    ASSERT_TRUE(same_bits(got.loop[i], want.loop[i])) << what << ", brute force, ray " << i;
   }
 }
 

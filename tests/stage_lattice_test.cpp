@@ -133,17 +133,22 @@ void expect_box_strictly_inside(const Lattice& lattice, const Box& box) {
   }
 }
 
-// Planes 0 to 2^bits - 1 are floats (the outermost may lie beyond FLT_MAX and is never needed).
-void expect_planes_are_floats_and_increase(const Lattice& lattice, int a, Random& random) {
+// Planes that can split something, those between two cells and within the box, are floats. (The
+// outermost may lie beyond FLT_MAX.)
+void expect_planes_are_floats_and_increase(const Lattice& lattice, const Box& box, int a,
+                                           Random& random) {
   const std::int64_t cells = std::int64_t{1} << lattice.bits[a];
   for (int i = 0; i < 64; ++i) {
     const std::int64_t k =
-        cells <= 64 ? i % cells
-                    : static_cast<std::int64_t>(random.below(static_cast<std::uint32_t>(cells)));
+        1 + (cells <= 64
+                 ? i % (cells - 1)
+                 : static_cast<std::int64_t>(random.below(static_cast<std::uint32_t>(cells - 1))));
     const double exact = lattice_plane(lattice, a, k);
+    if (exact > static_cast<double>(box.hi[a])) continue;
     const auto rounded = static_cast<float>(exact);
     ASSERT_TRUE(std::isfinite(rounded)) << "plane " << k << " of axis " << a;
     ASSERT_EQ(static_cast<double>(rounded), exact) << "plane " << k << " of axis " << a;
+    ASSERT_LT(lattice_plane(lattice, a, k - 1), exact);
     ASSERT_LT(exact, lattice_plane(lattice, a, k + 1));
   }
 }
@@ -153,6 +158,7 @@ void expect_cells_and_planes_agree(const Lattice& lattice, const Box& box, int a
   const std::int64_t cells = std::int64_t{1} << lattice.bits[a];
   for (int i = 0; i < 48; ++i) {
     const auto k = static_cast<std::int64_t>(random.below(static_cast<std::uint32_t>(cells)));
+    if (std::abs(lattice_plane(lattice, a, k)) > static_cast<double>(max_float)) continue;
     const auto plane = static_cast<float>(lattice_plane(lattice, a, k));
     const float between = box.lo[a] + (box.hi[a] / 2 - box.lo[a] / 2) * (2.0F * random.unit());
     for (const float x : {plane, ulps(plane, -1), ulps(plane, 1), box.lo[a], box.hi[a], between}) {
@@ -185,7 +191,7 @@ TEST(StageLattice, HoldsForEveryBoxWidthAndOrder) {
         for (int a = 0; a < 3; ++a) {
           if (lattice.bits[a] == 0) continue;
           ASSERT_LE(lattice.bits[a], 25u);
-          expect_planes_are_floats_and_increase(lattice, a, random);
+          expect_planes_are_floats_and_increase(lattice, c.box, a, random);
           expect_cells_and_planes_agree(lattice, c.box, a, random);
         }
         if (testing::Test::HasFailure()) return;

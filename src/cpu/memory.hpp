@@ -3,7 +3,12 @@
 // Blocks from the caller's memory resource.
 #pragma once
 
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
 #include <cstddef>
+#include <cstdint>
 #include <memory_resource>
 #include <new>
 #include <string>
@@ -14,6 +19,17 @@
 #include "core/arena.hpp"
 
 namespace zkd::cpu {
+
+/// Large blocks fresh from the system cost a page fault for every 4 KB, a tenth of a build. With huge
+/// pages it is one for every 2 MB. Only a hint, and only on memory that is not the caller's.
+inline void ask_for_huge_pages([[maybe_unused]] void* data, [[maybe_unused]] std::size_t bytes) {
+#if defined(__linux__)
+  constexpr std::uintptr_t page = std::uintptr_t{1} << 21;
+  const auto begin = (reinterpret_cast<std::uintptr_t>(data) + page - 1) / page * page;
+  const auto end = (reinterpret_cast<std::uintptr_t>(data) + bytes) / page * page;
+  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+#endif
+}
 
 /// One block, given back at the end of its life. Every failure to get one is an Error.
 class Block {
@@ -27,6 +43,7 @@ class Block {
       throw Error(ErrorCode::out_of_memory, bytes,
                   "the memory resource refused " + std::to_string(bytes) + " bytes");
     }
+    if (memory == std::pmr::new_delete_resource()) ask_for_huge_pages(data_, bytes);
   }
   Block(Block&& other) noexcept
       : memory_(other.memory_), data_(std::exchange(other.data_, nullptr)), bytes_(other.bytes_) {}
