@@ -6,7 +6,8 @@
 //
 // - A triangle is hit on both sides, edges and vertices included, and the hit is accepted when
 //   t_min <= t <= t_max for the t that is returned.
-// - The nearest hit wins; of equally near ones, the triangle with the lowest index.
+// - The nearest hit wins; of equally near ones, the triangle with the lowest index. Nearness is
+//   compared before t is rounded to the caller's units, which matters for far origins only.
 // - A ray that lies in a triangle's plane, up to rounding, does not hit it.
 // - A degenerate ray (see Ray) misses at once.
 // - The intersector is watertight (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT

@@ -78,7 +78,7 @@ struct TreeView {
   /// Tree space: every position in `nodes` is the caller's times this power of two, 2^-126 to
   /// 2^127. It is 1 unless the scene's largest coordinate lies outside 2^-16 to 2^32; then that
   /// coordinate is brought near 1, so that products of three coordinates neither overflow nor
-  /// lose digits.
+  /// lose digits. Scaling is exact but for what underflows: that is rounded to nearest.
   float scale = 1.0F;
 
   [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t node_count() const {

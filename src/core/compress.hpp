@@ -88,12 +88,12 @@ struct LinkEssentialNode {
     while (right < behind && right < near_by && levels[node + right + 1] > level) ++right;
     if (left == near_by) {
       const TrunkKey lowest = lowest_below(trunk_keys[node], level);
-      left += run_length(before - left,
+      left += run_length(before - left, near_by,
                          [&](std::uint32_t n) { return !(trunk_keys[node - left - n] < lowest); });
     }
     if (right == near_by) {
       const TrunkKey highest = highest_below(trunk_keys[node], level);
-      right += run_length(behind - right, [&](std::uint32_t n) {
+      right += run_length(behind - right, near_by, [&](std::uint32_t n) {
         return !(highest < trunk_keys[node + 1 + right + n]);
       });
     }

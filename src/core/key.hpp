@@ -60,6 +60,23 @@ struct SortedKeys {
   }
 };
 
+/// The same in one number, for codes of at most 32 bits: the code aligned to the left, and behind
+/// it the second-round code. Levels differ from those of a TrunkKey, but compare in the same way.
+struct PackedKeys {
+  SortedKeys<std::uint32_t> keys;
+
+  ZKD_HOST_DEVICE void load() { keys.load(); }
+
+  ZKD_HOST_DEVICE std::uint64_t operator[](std::uint32_t i) const {
+    return static_cast<std::uint64_t>(keys.codes[i]) << keys.align |
+           (keys.fine != nullptr ? keys.fine[i] : 0);
+  }
+};
+
+ZKD_HOST_DEVICE inline std::uint32_t parting_level(std::uint64_t a, std::uint64_t b) {
+  return a != b ? leading_zeros(a ^ b) : level_count;
+}
+
 /// Writes down the i-th key.
 template <class Code>
 struct WriteKey {

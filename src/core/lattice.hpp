@@ -177,8 +177,8 @@ struct SceneFrame {
   ZKD_HOST_DEVICE explicit SceneFrame(const Box& scene)
       : scale(power_of_two(scale_exponent(scene))) {
     for (int a = 0; a < 3; ++a) {
-      bounds.lo[a] = scene.lo[a] * static_cast<float>(scale);
-      bounds.hi[a] = scene.hi[a] * static_cast<float>(scale);
+      bounds.lo[a] = scene.lo[a] * static_cast<float>(scale) + 0.0F;
+      bounds.hi[a] = scene.hi[a] * static_cast<float>(scale) + 0.0F;
       largest = larger(largest, static_cast<double>(magnitude(bounds.lo[a])));
       largest = larger(largest, static_cast<double>(magnitude(bounds.hi[a])));
     }

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 
 #include <zkd/geometry.hpp>
 #include <zkd/options.hpp>
@@ -210,8 +211,9 @@ class MortonPipeline {
 
   void find_trunks(Workspace<Code>& work, const SortedKeys<Code>& keys) {
     backend_.stage(Stage::trunks);
+    using Keys = std::conditional_t<sizeof(Code) == 4, PackedKeys, SortedKeys<Code>>;
     backend_.select(valid(),
-                    BeginsTrunk<SortedKeys<Code>>{keys, &state_->report.valid, options_.leaf_size},
+                    BeginsTrunk<Keys>{Keys{keys}, &state_->report.valid, options_.leaf_size},
                     work.first, &state_->trunks);
     backend_.for_each(one, CountNodes{state_});
     backend_.for_each(trunks(), TrunkKeyOf<SortedKeys<Code>>{keys, work.first, work.trunk_keys});

@@ -86,7 +86,7 @@ struct PlaceSplitPlane {
       plane = crowd.plane(node + 1, above.fine, level - first_fine_level);
     }
     writer.axes[writer.stride * node] = plane.axis;
-    writer.planes[writer.stride * node] = static_cast<float>(plane.position * *scale);
+    writer.planes[writer.stride * node] = static_cast<float>(plane.position * *scale) + 0.0F;
   }
 };
 

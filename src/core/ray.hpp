@@ -159,9 +159,12 @@ struct PreparedRay {
   [[nodiscard]] ZKD_HOST_DEVICE Real bound(float t, Wide to_tree, double outward) const {
     if (!is_finite(t)) return t;
     const Wide end = Wide(static_cast<double>(t)) * to_tree;
-    constexpr double slack = 1.0 / 4194304.0;  // 2^-22
+    // The t that is compared with it was rounded to float once, and in the caller's units: by a
+    // relative error or, where it is denormal, by an absolute one.
+    constexpr double relative = 1.0 / 4194304.0;  // 2^-22
+    const double absolute = power_of_two(-149) * to_tree.value;
     const double moved =
-        (end - t_shift).value + outward * slack * magnitude(end.value) + outward * 1.0e-30;
+        (end - t_shift).value + outward * (relative * magnitude(end.value) + absolute + 1.0e-30);
     constexpr double float_max = 3.4028234663852886e38;
     if (moved > float_max) return 3.4028234663852886e38F;
     if (moved < -float_max) return -3.4028234663852886e38F;

@@ -49,7 +49,7 @@ struct CrowdedTrunkLength {
 
   ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t c) const {
     const std::uint32_t begin = first[c];
-    return 1 + run_length(count - 1 - begin,
+    return 1 + run_length(count - 1 - begin, 4,
                           [&](std::uint32_t n) { return codes[begin + n] == codes[begin]; });
   }
 };
@@ -67,7 +67,17 @@ struct CrowdedTriangles {
   };
   [[nodiscard]] ZKD_HOST_DEVICE Place operator[](std::uint32_t k) const {
     const std::uint32_t trunk = last_at_or_before(offsets, *trunks, k);
-    return {trunk, first[trunk] + (k - offsets[trunk])};
+    return {trunk, position(trunk, k)};
+  }
+
+  /// Whether number k is in this trunk.
+  [[nodiscard]] ZKD_HOST_DEVICE bool holds(std::uint32_t trunk, std::uint32_t k) const {
+    return offsets[trunk] <= k && (trunk + 1 == *trunks || k < offsets[trunk + 1]);
+  }
+
+  /// Sorted position of number k, which is in this trunk.
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t position(std::uint32_t trunk, std::uint32_t k) const {
+    return first[trunk] + (k - offsets[trunk]);
   }
 };
 
@@ -106,9 +116,14 @@ struct RecodeTriangle {
   const MortonCoder* coders;
   std::uint64_t* fine_keys;
   std::uint32_t* fine_ids;
+  std::uint32_t last_trunk = 0;  // of the triangle before: most follow in the same
 
-  ZKD_HOST_DEVICE void operator()(std::uint32_t k) const {
-    const CrowdedTriangles::Place place = crowded[k];
+  ZKD_HOST_DEVICE void operator()(std::uint32_t k) {
+    const CrowdedTriangles::Place place =
+        crowded.holds(last_trunk, k)
+            ? CrowdedTriangles::Place{last_trunk, crowded.position(last_trunk, k)}
+            : crowded[k];
+    last_trunk = place.trunk;
     const std::uint32_t id = ids[place.position];
     const Box& box = boxes[id];
     const double point[3] = {centre(box, 0), centre(box, 1), centre(box, 2)};
@@ -128,7 +143,9 @@ struct PlaceRecoded {
   std::uint32_t* fine;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t k) const {
-    const std::uint32_t position = crowded[k].position;
+    // Trunks are the keys' upper halves, and keep their numbers of triangles through the sort.
+    const auto trunk = static_cast<std::uint32_t>(fine_keys[k] >> 32);
+    const std::uint32_t position = crowded.position(trunk, k);
     ids[position] = fine_ids[k];
     fine[position] = static_cast<std::uint32_t>(fine_keys[k]);
   }

@@ -30,12 +30,12 @@ ZKD_HOST_DEVICE inline std::uint32_t last_at_or_before(const std::uint32_t* numb
   return first_not_below(numbers, count, value + 1) - 1;
 }
 
-/// How far `holds(1), holds(2), ...` stays true, at most `most` steps: gallop, then bisect. Short
-/// runs are found in few steps.
+/// How far `holds(1), holds(2), ...` stays true, at most `most` steps: gallop from `step` on, a
+/// power of two, then bisect.
 template <class Predicate>
-ZKD_HOST_DEVICE inline std::uint32_t run_length(std::uint32_t most, const Predicate& holds) {
+ZKD_HOST_DEVICE inline std::uint32_t run_length(std::uint32_t most, std::uint32_t step,
+                                                const Predicate& holds) {
   std::uint32_t reached = 0;
-  std::uint32_t step = 1;
   while (step <= most - reached && holds(reached + step)) {
     reached += step;
     step *= 2;

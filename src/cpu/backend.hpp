@@ -21,15 +21,19 @@
 #include <zkd/tree.hpp>
 
 #include "core/pipeline.hpp"
+#include "cpu/float_environment.hpp"
 #include "cpu/memory.hpp"
 #include "cpu/radix_sort.hpp"
 #include "cpu/threads.hpp"
 
 namespace zkd::cpu {
 
+/// A copy of its own for each range, ready to be called: its members then stay in registers, which
+/// writes through pointers cannot reach.
 template <class Functor>
-void load(Functor& f) {
+Functor loaded(Functor f) {
   if constexpr (requires { f.load(); }) f.load();
+  return f;
 }
 
 class Backend {
@@ -42,9 +46,9 @@ class Backend {
 
   template <class Functor>
   void for_each(core::Count count, Functor f) {
-    threads_.share(size(count), grain, [f](Range range) mutable {
-      load(f);
-      for (std::uint32_t i = range.begin; i < range.end; ++i) f(i);
+    threads_.share(size(count), grain, [f](Range range) {
+      Functor g = loaded(f);
+      for (std::uint32_t i = range.begin; i < range.end; ++i) g(i);
     });
   }
 
@@ -53,10 +57,10 @@ class Backend {
     const std::uint32_t n = size(count);
     const int team = threads_.team(n);
     Scratch<T> parts(*this, static_cast<std::size_t>(team));
-    threads_.divide(n, team, [f, parts = parts.data](Range range, int thread) mutable {
-      load(f);
+    threads_.divide(n, team, [f, parts = parts.data](Range range, int thread) {
+      Functor g = loaded(f);
       T mine{};
-      for (std::uint32_t i = range.begin; i < range.end; ++i) f(i, mine);
+      for (std::uint32_t i = range.begin; i < range.end; ++i) g(i, mine);
       parts[thread] = mine;
     });
     *out = T{};
@@ -70,12 +74,12 @@ class Backend {
     const std::uint32_t n = size(count);
     const int team = threads_.team(n);
     Scratch<std::uint32_t> selected(*this, static_cast<std::size_t>(team));
-    threads_.divide(n, team, [f, out, selected = selected.data](Range range, int thread) mutable {
-      load(f);
+    threads_.divide(n, team, [f, out, selected = selected.data](Range range, int thread) {
+      Functor g = loaded(f);
       std::uint32_t* to = out + range.begin;
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
         *to = i;  // kept only if the place is not taken again; without a branch
-        to += f(i) ? 1 : 0;
+        to += g(i) ? 1 : 0;
       }
       selected[thread] = static_cast<std::uint32_t>(to - (out + range.begin));
     });
@@ -93,11 +97,11 @@ class Backend {
     const std::uint32_t n = size(count);
     const int team = threads_.team(n);
     Scratch<std::uint64_t> sums(*this, static_cast<std::size_t>(team));
-    threads_.divide(n, team, [f, out, sums = sums.data](Range range, int thread) mutable {
-      load(f);
+    threads_.divide(n, team, [f, out, sums = sums.data](Range range, int thread) {
+      Functor g = loaded(f);
       std::uint64_t sum = 0;
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
-        const std::uint32_t value = f(i);
+        const std::uint32_t value = g(i);
         out[i] = static_cast<std::uint32_t>(sum);
         sum += value;
       }
@@ -127,8 +131,8 @@ class Backend {
       std::uint32_t segment = 0;
     };
     Scratch<Head> heads(*this, static_cast<std::size_t>(team));
-    threads_.divide(elements, team, [=, heads = heads.data](Range range, int thread) mutable {
-      load(f);
+    threads_.divide(elements, team, [=, heads = heads.data](Range range, int thread) {
+      Functor g = loaded(f);
       Head head;
       if (range.begin < range.end) {
         const auto* const after = std::upper_bound(offsets, offsets + segments, range.begin);
@@ -140,7 +144,7 @@ class Backend {
               segment + 1 < segments ? offsets[segment + 1] : elements;
           const bool begins_here = offsets[segment] >= range.begin;
           T value{};
-          for (; i < std::min(segment_end, range.end); ++i) f(segment, i, value);
+          for (; i < std::min(segment_end, range.end); ++i) g(segment, i, value);
           if (begins_here)
             out[segment] = value;
           else
@@ -161,20 +165,29 @@ class Backend {
     SortScratch scratch{};
     const int team = threads_.team(n);
     const Block block = lay_out(scratch, team, digits_of(bits));
-    return cpu::radix_sort(threads_, scratch, buffers, n, bits, passes_left_out_);
+    return RadixSort<Key>(threads_, scratch, buffers, n, bits).run(passes_left_out_);
   }
 
   template <class Functor>
   void climb(core::Count leaves, std::uint32_t* arrivals, Functor f) {
-    threads_.share(size(leaves), grain / 4, [f, arrivals](Range range) mutable {
-      load(f);
+    threads_.share(size(leaves), grain / 4, [f, arrivals](Range range) {
+      Functor g = loaded(f);
       // Leaves first, some at a time: an atomic operation would hold up the loads of the next leaf.
       constexpr std::uint32_t at_a_time = 64;
       core::Parent parents[at_a_time];
       for (std::uint32_t leaf = range.begin; leaf < range.end;) {
         const std::uint32_t batch = std::min(at_a_time, range.end - leaf);
-        for (std::uint32_t i = 0; i < batch; ++i) parents[i] = f.begin(leaf + i);
-        for (std::uint32_t i = 0; i < batch; ++i) climb_from(parents[i], arrivals, f);
+        for (std::uint32_t i = 0; i < batch; ++i) g.prefetch(leaf + i);
+        for (std::uint32_t i = 0; i < batch; ++i) parents[i] = g.begin(leaf + i);
+        for (std::uint32_t i = 0; i < batch; ++i) {
+          core::Parent parent = parents[i];
+          // Two leaves of one node need not be told to wait for each other.
+          if (i + 1 < batch && !parent.is_none() && parents[i + 1].node() == parent.node()) {
+            parent = g.rise(parent.node());
+            ++i;
+          }
+          climb_from(parent, arrivals, g);
+        }
         leaf += batch;
       }
     });
@@ -323,6 +336,7 @@ class Backend {
 
   static constexpr int max_blocks = 4;
 
+  FloatEnvironment environment_;  // for the serial steps between passes
   Threads threads_;
   std::pmr::memory_resource* memory_;
   Block blocks_[max_blocks];

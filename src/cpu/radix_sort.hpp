@@ -5,6 +5,7 @@
 // so the result does not depend on the number of threads.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <utility>
@@ -32,66 +33,121 @@ struct SortScratch {
 
 inline std::uint32_t digits_of(std::uint32_t bits) { return (bits + digit_bits - 1) / digit_bits; }
 
-/// Sorts `count` pairs by the low `bits` bits of the keys. Returns the buffers with the result in
-/// `keys` and `values`; adds the number of passes left out because a digit was the same in all
-/// keys.
-template <class Key>
-core::SortBuffers<Key> radix_sort(const Threads& threads, SortScratch scratch,
-                                  core::SortBuffers<Key> buffers, std::uint32_t count,
-                                  std::uint32_t bits, std::uint32_t& passes_left_out) {
-  const std::uint32_t digits = digits_of(bits);
-  const int team = threads.team(count);
-  const auto digit = [](Key key, std::uint32_t which) {
-    return static_cast<std::uint32_t>(key >> (which * digit_bits)) & (digit_values - 1);
-  };
-  Histogram* const counts = scratch.counts;
-  const auto count_of = [counts, digits](int thread, std::uint32_t which) -> Histogram& {
-    return counts[static_cast<std::size_t>(thread) * digits + which];
-  };
+/// One digit of a key of `bits` bits; the last may be shorter.
+struct Digit {
+  std::uint32_t shift;
+  std::uint32_t mask;
 
-  // All digits are counted in one pass over the input: that tells which of them vary, and the first
-  // one that does needs no counting of its own.
-  threads.divide(count, team, [=](Range range, int thread) {
-    std::memset(count_of(thread, 0), 0, sizeof(Histogram) * digits);
-    for (std::uint32_t i = range.begin; i < range.end; ++i)
-      for (std::uint32_t d = 0; d < digits; ++d) ++count_of(thread, d)[digit(buffers.keys[i], d)];
-  });
-  bool moved = false;
-  for (std::uint32_t d = 0; d < digits; ++d) {
-    if (count > 0) {
-      const std::uint32_t first = digit(buffers.keys[0], d);
-      std::uint32_t same = 0;
-      for (int thread = 0; thread < team; ++thread) same += count_of(thread, d)[first];
-      // Counts of the whole input are right after any number of passes, so the parts' sum is too,
-      // but only before the threads count this digit again.
-      if (same == count) {
+  Digit(std::uint32_t which, std::uint32_t bits)
+      : shift(which * digit_bits), mask((1u << std::min(digit_bits, bits - shift)) - 1) {}
+
+  template <class Key>
+  std::uint32_t operator()(Key key) const {
+    return static_cast<std::uint32_t>(key >> shift) & mask;
+  }
+};
+
+/// One sort: the input's parts, one per thread, and how often each digit occurs in them.
+template <class Key>
+class RadixSort {
+ public:
+  RadixSort(const Threads& threads, SortScratch scratch, core::SortBuffers<Key> buffers,
+            std::uint32_t count, std::uint32_t bits)
+      : threads_(threads),
+        counts_(scratch.counts),
+        buffers_(buffers),
+        count_(count),
+        bits_(bits),
+        digits_(digits_of(bits)),
+        team_(threads.team(count)) {}
+
+  /// Returns the buffers with the result in `keys` and `values`; adds the number of passes left out
+  /// because a digit was the same in all keys.
+  core::SortBuffers<Key> run(std::uint32_t& passes_left_out) {
+    if (count_ == 0) return buffers_;
+    count_all_digits();
+    bool moved = false;
+    for (std::uint32_t d = 0; d < digits_; ++d) {
+      if (is_constant(d)) {
         ++passes_left_out;
         continue;
       }
+      if (moved) count_digit(d);  // how often is known, but no longer in which part
+      make_places(d);
+      scatter(d);
+      moved = true;
     }
-    if (moved)
-      threads.divide(count, team, [=](Range range, int thread) {
-        Histogram& mine = count_of(thread, d);
-        std::memset(mine, 0, sizeof(Histogram));
-        for (std::uint32_t i = range.begin; i < range.end; ++i) ++mine[digit(buffers.keys[i], d)];
-      });
-    std::uint32_t place = 0;
-    for (std::uint32_t value = 0; value < digit_values; ++value)
-      for (int thread = 0; thread < team; ++thread)
-        place += std::exchange(count_of(thread, d)[value], place);
-    threads.divide(count, team, [=](Range range, int thread) {
-      Histogram& places = count_of(thread, d);
-      for (std::uint32_t i = range.begin; i < range.end; ++i) {
-        const std::uint32_t to = places[digit(buffers.keys[i], d)]++;
-        buffers.other_keys[to] = buffers.keys[i];
-        buffers.other_values[to] = buffers.values[i];
+    return buffers_;
+  }
+
+ private:
+  [[nodiscard]] Histogram& counts(int thread, std::uint32_t digit) const {
+    return counts_[static_cast<std::size_t>(thread) * digits_ + digit];
+  }
+
+  /// In one pass over the input, a stretch of it at a time so that it is read from cache.
+  void count_all_digits() const {
+    threads_.divide(count_, team_, [this](Range range, int thread) {
+      std::memset(counts(thread, 0), 0, sizeof(Histogram) * digits_);
+      constexpr std::uint32_t stretch = 2048;
+      for (std::uint32_t begin = range.begin; begin < range.end;) {
+        const std::uint32_t end = begin + std::min(stretch, range.end - begin);
+        for (std::uint32_t d = 0; d < digits_; ++d) add(counts(thread, d), d, {begin, end});
+        begin = end;
       }
     });
-    std::swap(buffers.keys, buffers.other_keys);
-    std::swap(buffers.values, buffers.other_values);
-    moved = true;
   }
-  return buffers;
-}
+
+  void count_digit(std::uint32_t d) const {
+    threads_.divide(count_, team_, [this, d](Range range, int thread) {
+      std::memset(counts(thread, d), 0, sizeof(Histogram));
+      add(counts(thread, d), d, range);
+    });
+  }
+
+  void add(Histogram& histogram, std::uint32_t d, Range range) const {
+    const Digit digit(d, bits_);
+    const Key* const keys = buffers_.keys;
+    for (std::uint32_t i = range.begin; i < range.end; ++i) ++histogram[digit(keys[i])];
+  }
+
+  /// Moving does not change how often a digit occurs, so the first count serves all passes.
+  [[nodiscard]] bool is_constant(std::uint32_t d) const {
+    const std::uint32_t value = Digit(d, bits_)(buffers_.keys[0]);
+    std::uint32_t same = 0;
+    for (int thread = 0; thread < team_; ++thread) same += counts(thread, d)[value];
+    return same == count_;
+  }
+
+  /// Turns counts into places: digits in order, and within one digit the threads in order.
+  void make_places(std::uint32_t d) const {
+    std::uint32_t place = 0;
+    for (std::uint32_t value = 0; value < digit_values; ++value)
+      for (int thread = 0; thread < team_; ++thread)
+        place += std::exchange(counts(thread, d)[value], place);
+  }
+
+  void scatter(std::uint32_t d) {
+    threads_.divide(count_, team_,
+                    [b = buffers_, digit = Digit(d, bits_), this, d](Range range, int thread) {
+                      Histogram& places = counts(thread, d);
+                      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+                        const std::uint32_t to = places[digit(b.keys[i])]++;
+                        b.other_keys[to] = b.keys[i];
+                        b.other_values[to] = b.values[i];
+                      }
+                    });
+    std::swap(buffers_.keys, buffers_.other_keys);
+    std::swap(buffers_.values, buffers_.other_values);
+  }
+
+  const Threads& threads_;
+  Histogram* counts_;
+  core::SortBuffers<Key> buffers_;
+  std::uint32_t count_;
+  std::uint32_t bits_;
+  std::uint32_t digits_;
+  int team_;
+};
 
 }  // namespace zkd::cpu

@@ -109,6 +109,7 @@ Lattice make_lattice(const Box& bounds, std::uint32_t code_bits, AxisOrder order
   if (code_bits < 1 || code_bits > 64)
     throw Error(ErrorCode::invalid_option, code_bits,
                 "code_bits is " + std::to_string(code_bits) + "; it must be 1 to 64");
+  const cpu::FloatEnvironment environment;
   return core::make_lattice(core::widen(bounds), code_bits, order);
 }
 
@@ -212,16 +213,17 @@ void split_planes(const cpu::Executor& executor, std::span<const TrunkKey> trunk
   check_length(crowd.size(), trunk_keys.size(), "crowd");
   check_length(axes.size(), levels.size(), "axes");
   check_length(planes.size(), levels.size(), "planes");
+  cpu::Backend backend(executor);
   const core::MortonCoder coder(lattice);
   const double unscaled = 1.0;
-  cpu::Backend(executor).for_each(exactly(levels.size()), core::PlaceSplitPlane<core::CrowdByTrunk>{
-                                                              trunk_keys.data(),
-                                                              levels.data(),
-                                                              &lattice,
-                                                              &coder,
-                                                              {crowd.data(), lattices.data()},
-                                                              &unscaled,
-                                                              {axes.data(), planes.data(), 1}});
+  backend.for_each(exactly(levels.size()),
+                   core::PlaceSplitPlane<core::CrowdByTrunk>{trunk_keys.data(),
+                                                             levels.data(),
+                                                             &lattice,
+                                                             &coder,
+                                                             {crowd.data(), lattices.data()},
+                                                             &unscaled,
+                                                             {axes.data(), planes.data(), 1}});
 }
 
 }  // namespace zkd::stages
