@@ -31,6 +31,16 @@ macro(zkd_look_for_module package module debian)
   endif()
 endmacro()
 
+# Embree, which zkd is compared with and never needs. Sets zkd_embree to its major version, 3 or 4
+# (they differ in their headers and calls; the target is `embree` in both), or to nothing.
+macro(zkd_look_for_embree)
+  find_package(embree QUIET)
+  set(zkd_embree "")
+  if(embree_FOUND AND embree_VERSION MATCHES "^([34])\\.")
+    set(zkd_embree ${CMAKE_MATCH_1})
+  endif()
+endmacro()
+
 # add_subdirectory(directory) if everything it NEEDS (packages looked for above, or targets) is
 # there; otherwise one line that says why not. Its targets become targets of ours (targets.cmake).
 function(zkd_add_directory directory)

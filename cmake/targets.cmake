@@ -36,6 +36,3 @@ function(zkd_own_target target)
   endif()
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:${options}>")
 endfunction()
-
-function(zkd_arithmetic target)  # TEMPORARY: now part of zkd_own_target
-endfunction()

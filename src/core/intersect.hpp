@@ -93,7 +93,8 @@ ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& cor
   if (t == best.t && !(id < best.triangle)) return false;
   const float callers_t = ray.callers_t(t);
   if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
-  best = {t, callers_t, u.value, v.value, id};
+  // Adding +0 turns -0 into +0.
+  best = {t, callers_t, (u + Real(0.0F)).value, (v + Real(0.0F)).value, id};
   return true;
 }
 

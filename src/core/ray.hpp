@@ -163,12 +163,12 @@ struct PreparedRay {
     // relative error or, where it is denormal, by an absolute one.
     constexpr double relative = 1.0 / 4194304.0;  // 2^-22
     const double absolute = power_of_two(-149) * to_tree.value;
-    const double moved =
+    const double reached =
         (end - t_shift).value + outward * (relative * magnitude(end.value) + absolute + 1.0e-30);
     constexpr double float_max = 3.4028234663852886e38;
-    if (moved > float_max) return 3.4028234663852886e38F;
-    if (moved < -float_max) return -3.4028234663852886e38F;
-    return static_cast<float>(moved);
+    if (reached > float_max) return 3.4028234663852886e38F;
+    if (reached < -float_max) return -3.4028234663852886e38F;
+    return static_cast<float>(reached);
   }
 };
 

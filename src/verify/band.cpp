@@ -58,10 +58,13 @@ struct Facts {
   double t;            // where the ray meets the plane; NaN for a ray in the plane
   double t_allowance;  // how well a float intersector knows t; infinite for a ray in the plane
   double reach;        // largest |corner - o|
+  double lost;         // how far scaling may have moved a sheared coordinate
 };
 
-Facts examine(const Point& o, const Point& d, const Corners& corners) {
+// `lost`: how far scaling may have moved a coordinate, at most.
+Facts examine(const Point& o, const Point& d, const Corners& corners, double lost) {
   Facts facts{};
+  facts.lost = 4.0 * lost;
   Corners p{};
   for (std::size_t i = 0; i < 3; ++i) {
     p[i] = difference(corners[i], o);
@@ -96,11 +99,14 @@ Facts examine(const Point& o, const Point& d, const Corners& corners) {
                          a.moved[0] * b.moved[1] + a.moved[1] * b.moved[0];
     const Determinant exact = determinant(d, p[i], p[j]);
     const double underflow = underflow_band * std::abs(d[z]) * facts.reach * facts.reach;
+    double collapse = facts.lost * facts.lost;
+    for (int k = 0; k < 2; ++k) collapse += facts.lost * (std::abs(a.at[k]) + std::abs(b.at[k]));
     const double rounding = std::min(determinant_band * exact.permanent, std::abs(d[z]) * moved);
     // The sign is exact; where the filter cannot tell, the value is far below any band but 0.
     const int sign = determinant_sign(d, o, corners[i], corners[j]);
-    facts.edge[i] = {sign * std::abs(exact.value),
-                     exact.permanent == 0.0 ? 0.0 : rounding + underflow};
+    facts.edge[i] = {
+        sign * std::abs(exact.value),
+        exact.permanent == 0.0 ? 0.0 : rounding + underflow + std::abs(d[z]) * collapse};
   }
 
   const PlaneHit plane = plane_hit(o, d, corners);
@@ -109,7 +115,8 @@ Facts examine(const Point& o, const Point& d, const Corners& corners) {
   facts.along = {plane.denominator, determinant_band * along.permanent};
   facts.t = plane.t;
   facts.t_allowance =
-      t_band * facts.reach * plane.normal / std::abs(plane.denominator) + smallest_float;
+      (t_band * facts.reach + facts.lost) * plane.normal / std::abs(plane.denominator) +
+      smallest_float;
   return facts;
 }
 
@@ -170,7 +177,7 @@ bool may_be_invented(const Facts& facts, const Ray& ray, const Hit& hit, const C
   const Corners seen = {difference(corners[0], o), difference(corners[1], o),
                         difference(corners[2], o)};
   return distance({t * d[0], t * d[1], t * d[2]}, seen) <=
-         2.0 * t_band * facts.reach + smallest_float * length(d);
+         2.0 * t_band * facts.reach + facts.lost + smallest_float * length(d);
 }
 
 // The float ulp at x.
@@ -215,7 +222,7 @@ Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ra
   const Point o = point(ray.origin);
   const Point d = point(ray.direction);
   const auto examined = [&](std::size_t triangle) {
-    return examine(o, d, *finite_corners(triangles, triangle));
+    return examine(o, d, *finite_corners(triangles, triangle), oracle.lost_by_scaling());
   };
 
   // The triangle answered must be a hit, or an excused one, and not in front of what an exact t

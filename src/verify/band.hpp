@@ -21,7 +21,8 @@ namespace zkd::verify {
 ///   Where the edge functions are taken from corners sheared along the ray, as in the watertight
 ///   test, the band is less: what the corners' rounding, 16 * 2^-24 of their terms, moves the
 ///   determinant by. Underflow adds underflow_band * |d| * max |vertex - o|^2, less than anything
-///   a float scene can tell apart. A determinant whose products are all zero is never excused.
+///   a float scene can tell apart, and in scenes that are scaled down what that loses. A
+///   determinant whose products are all zero is never excused.
 /// - t = (a - o) . n / (d . n): known to t_band * max |vertex - o| * |n| / |d . n|, in units of t,
 ///   and to the smallest float.
 ///   Two t differ outside the band when their difference is above the larger of their allowances.

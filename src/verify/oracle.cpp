@@ -317,6 +317,7 @@ bool degenerate(const Ray& ray) noexcept {
 struct Oracle::Scene {
   std::vector<Triangle> triangles;
   std::vector<BoxNode> nodes;  // empty: every query is a loop over all triangles
+  double largest = 0.0;        // magnitude of a coordinate
 
   // Calls visit(triangle) for every triangle that the ray may meet at t <= t_far, near boxes first;
   // visit may lower t_far, and ends the walk by returning true.
@@ -368,6 +369,9 @@ Oracle::Oracle(const TriangleView& triangles, Search search) {
     for (int corner = 0; corner < 3; ++corner) {
       const float* position = triangles.position(triangles.index(i, corner));
       std::copy_n(position, 3, triangle.corner[corner]);
+      for (int axis = 0; axis < 3; ++axis) {
+        scene->largest = std::max(scene->largest, std::abs(static_cast<double>(position[axis])));
+      }
     }
     triangle.id = static_cast<std::uint32_t>(i);
     scene->triangles.push_back(triangle);
@@ -423,6 +427,10 @@ ExactHit Oracle::closest_hit(const Ray& ray) const {
     hit.hit_class = any_vertex ? HitClass::vertex : HitClass::edge;
   }
   return hit;
+}
+
+double Oracle::lost_by_scaling() const {
+  return scene_->largest > 0x1p32 ? 0x1p-149 * scene_->largest : 0.0;
 }
 
 bool Oracle::any_hit(const Ray& ray) const {

@@ -68,6 +68,10 @@ class Oracle {
   /// Every triangle that the ray hits between its ends, near or far, ascending ids.
   [[nodiscard]] std::vector<std::uint32_t> all_hits(const Ray& ray) const;
 
+  /// What the library's scaling may take off a coordinate (TreeView::scale): nothing unless the
+  /// largest coordinate is above 2^32; then what underflows when that one is brought near 1.
+  [[nodiscard]] double lost_by_scaling() const;
+
  private:
   struct Scene;
   std::unique_ptr<const Scene> scene_;
