@@ -64,11 +64,17 @@ struct Rounded<double> {
   friend __device__ Rounded operator-(Rounded a, Rounded b) { return __dsub_rn(a.value, b.value); }
   friend __device__ Rounded operator*(Rounded a, Rounded b) { return __dmul_rn(a.value, b.value); }
   friend __device__ Rounded operator/(Rounded a, Rounded b) { return __ddiv_rn(a.value, b.value); }
+  friend __device__ Rounded fma(Rounded a, Rounded b, Rounded c) {
+    return __fma_rn(a.value, b.value, c.value);
+  }
 #else
   friend ZKD_HOST_DEVICE Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
   friend ZKD_HOST_DEVICE Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
   friend ZKD_HOST_DEVICE Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
   friend ZKD_HOST_DEVICE Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
+  friend ZKD_HOST_DEVICE Rounded fma(Rounded a, Rounded b, Rounded c) {
+    return __builtin_fma(a.value, b.value, c.value);
+  }
 #endif
   friend ZKD_HOST_DEVICE Rounded operator-(Rounded a) { return -a.value; }
   friend ZKD_HOST_DEVICE bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
@@ -80,9 +86,11 @@ using Wide = Rounded<double>;
 
 /// a * b - c * d with an error below 1.5 ulp and, short of underflow, the exact sign (Kahan;
 /// Jeannerod, Louvet, Muller: Further analysis of Kahan's algorithm, 2013).
-ZKD_HOST_DEVICE inline Real difference_of_products(Real a, Real b, Real c, Real d) {
-  const Real cd = c * d;
-  const Real rounding = fma(-c, d, cd);
+template <class T>
+ZKD_HOST_DEVICE inline Rounded<T> difference_of_products(Rounded<T> a, Rounded<T> b, Rounded<T> c,
+                                                         Rounded<T> d) {
+  const Rounded<T> cd = c * d;
+  const Rounded<T> rounding = fma(-c, d, cd);
   return fma(a, b, -cd) + rounding;
 }
 

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Ray against triangle, watertight: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT
-// 2013, with Kahan's difference of products for the edge functions. Their signs are then exact for
-// the sheared coordinates, so two triangles that share an edge never both miss a ray through it.
+// 2013, as a filter. Single precision decides where its rounding cannot change the outcome, double
+// precision the rest.
+//
+// Corners are sheared along the ray; the signs of the edge functions of the sheared corners say
+// whether the ray passes inside. Where all are larger than an error bound, they are the signs that
+// the corners sheared in double have; else those are computed, by Kahan's difference of products,
+// whose sign is exact. So all signs belong to one set of points, and two triangles that share an
+// edge never both miss a ray through it.
 #pragma once
 
 #include <cstdint>
@@ -26,75 +32,96 @@ struct Candidate {
   [[nodiscard]] ZKD_HOST_DEVICE bool found() const { return triangle != no_triangle; }
 };
 
-/// Edge functions of the sheared corners, each twice the area opposite a corner, and their sum.
-template <class T>
-struct Edges {
-  T a;
-  T b;
-  T c;
-
-  [[nodiscard]] ZKD_HOST_DEVICE bool mixed_signs() const {
-    const T zero = T(0);
-    return (a < zero || b < zero || c < zero) && (a > zero || b > zero || c > zero);
-  }
-  [[nodiscard]] ZKD_HOST_DEVICE T determinant() const { return a + b + c; }
+/// The ray meets the plane of a triangle inside it: where, in tree space.
+struct PlanePoint {
+  Real t;
+  Real u;
+  Real v;
 };
 
-/// Below this, 2^-96, edge functions in single precision lose digits to underflow.
-inline constexpr float smallest_edge = 1.2621774e-29F;
+/// In double: for the few rays that pass an edge within the rounding of single precision.
+ZKD_HOST_DEVICE inline bool intersect_wide(const PreparedRay& ray, const Corners& corners,
+                                           PlanePoint& point) {
+  Wide x[3];
+  Wide y[3];
+  Wide depth[3];
+  for (int i = 0; i < 3; ++i) {
+    depth[i] = ray.wide_from_origin(corners.p[i], 2);
+    x[i] = ray.wide_from_origin(corners.p[i], 0) - ray.wide_shear[0] * depth[i];
+    y[i] = ray.wide_from_origin(corners.p[i], 1) - ray.wide_shear[1] * depth[i];
+  }
+  const Wide a = difference_of_products(x[2], y[1], y[2], x[1]);
+  const Wide b = difference_of_products(x[0], y[2], y[0], x[2]);
+  const Wide c = difference_of_products(x[1], y[0], y[1], x[0]);
+  const Wide zero = 0.0;
+  if ((a < zero || b < zero || c < zero) && (a > zero || b > zero || c > zero)) return false;
+  const Wide determinant = a + b + c;
+  if (!(determinant < zero) && !(determinant > zero)) return false;
+  const Wide t = (a * depth[0] + b * depth[1] + c * depth[2]) * ray.wide_shear[2] / determinant;
+  point = {static_cast<float>(t.value), static_cast<float>((b / determinant).value),
+           static_cast<float>((c / determinant).value)};
+  return true;
+}
+
+/// Whether the ray's line passes inside the triangle, and where it meets its plane.
+ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners& corners,
+                                           PlanePoint& point) {
+  Real x[3];
+  Real y[3];
+  Real depth[3];
+  float size_x = 0.0F;
+  float size_y = 0.0F;
+  float across_x = 0.0F;
+  float across_y = 0.0F;
+  for (int i = 0; i < 3; ++i) {
+    const Real along = ray.from_origin(corners.p[i], 2);
+    const Real right = ray.from_origin(corners.p[i], 0);
+    const Real up = ray.from_origin(corners.p[i], 1);
+    x[i] = fma(-ray.shear[0], along, right);
+    y[i] = fma(-ray.shear[1], along, up);
+    depth[i] = along;
+    size_x = larger(size_x, magnitude(right.value) + magnitude(along.value));
+    size_y = larger(size_y, magnitude(up.value) + magnitude(along.value));
+    across_x = larger(across_x, magnitude(x[i].value));
+    across_y = larger(across_y, magnitude(y[i].value));
+  }
+  const Real a = difference_of_products(x[2], y[1], y[2], x[1]);
+  const Real b = difference_of_products(x[0], y[2], y[0], x[2]);
+  const Real c = difference_of_products(x[1], y[0], y[1], x[0]);
+
+  // Subtraction, the slope and the shear round a sheared coordinate four times, each by 2^-24 of
+  // its size at most; 6 leaves room for the products and for the bound's own rounding. Below 2^-96
+  // edge functions lose digits to underflow.
+  constexpr float unit = 1.0F / 16777216.0F;
+  constexpr float smallest = 1.2621774e-29F;
+  const float error_x = 6.0F * unit * size_x;
+  const float error_y = 6.0F * unit * size_y;
+  const float bound =
+      larger(2.0F * (error_x * (across_y + error_y) + error_y * across_x), smallest);
+  const float least = smaller(a.value, smaller(b.value, c.value));
+  const float most = larger(a.value, larger(b.value, c.value));
+  if (least < -bound && most > bound) return false;
+  if (!(least > bound || most < -bound)) return intersect_wide(ray, corners, point);
+
+  const Real determinant = a + b + c;
+  point = {fma(a, depth[0], fma(b, depth[1], c * depth[2])) * ray.shear[2] / determinant,
+           b / determinant, c / determinant};
+  return true;
+}
 
 /// Replaces `best` by the hit on this triangle, if there is one in the ray's interval and nearer.
 /// Returns whether it did.
 ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& corners,
                                       std::uint32_t id, Candidate& best) {
-  Real x[3];
-  Real y[3];
-  Real depth[3];
-  for (int i = 0; i < 3; ++i) {
-    // Scaled before the origin is taken off: exact, and the same with and without fma.
-    const Real along = ray.from_origin(corners.p[i], 2);
-    x[i] = fma(-ray.shear[0], along, ray.from_origin(corners.p[i], 0));
-    y[i] = fma(-ray.shear[1], along, ray.from_origin(corners.p[i], 1));
-    depth[i] = along;
-  }
-  const Edges<Real> edges{difference_of_products(x[2], y[1], y[2], x[1]),
-                          difference_of_products(x[0], y[2], y[0], x[2]),
-                          difference_of_products(x[1], y[0], y[1], x[0])};
-  Real t;
-  Real u;
-  Real v;
-  const float largest =
-      larger(magnitude(edges.a.value), larger(magnitude(edges.b.value), magnitude(edges.c.value)));
-  if (!(largest < smallest_edge)) {
-    if (edges.mixed_signs()) return false;
-    const Real determinant = edges.determinant();
-    if (determinant == Real(0.0F)) return false;
-    t = fma(edges.a, depth[0], fma(edges.b, depth[1], edges.c * depth[2])) * ray.shear[2] /
-        determinant;
-    u = edges.b / determinant;
-    v = edges.c / determinant;
-  } else {
-    // Products of floats are exact in double, so signs are again.
-    const Wide wx[3] = {x[0].value, x[1].value, x[2].value};
-    const Wide wy[3] = {y[0].value, y[1].value, y[2].value};
-    const Edges<Wide> wide{wx[2] * wy[1] - wy[2] * wx[1], wx[0] * wy[2] - wy[0] * wx[2],
-                           wx[1] * wy[0] - wy[1] * wx[0]};
-    if (wide.mixed_signs()) return false;
-    const Wide determinant = wide.determinant();
-    if (!(determinant < Wide(0.0)) && !(determinant > Wide(0.0))) return false;
-    const Wide sum = wide.a * Wide(depth[0].value) + wide.b * Wide(depth[1].value) +
-                     wide.c * Wide(depth[2].value);
-    t = static_cast<float>((sum * Wide(ray.shear[2].value) / determinant).value);
-    u = static_cast<float>((wide.b / determinant).value);
-    v = static_cast<float>((wide.c / determinant).value);
-  }
+  PlanePoint point;
+  if (!intersect_line(ray, corners, point)) return false;
   // Written so that NaN, from coordinates that are not finite, is never accepted.
-  if (!(t <= best.t)) return false;
-  if (t == best.t && !(id < best.triangle)) return false;
-  const float callers_t = ray.callers_t(t);
+  if (!(point.t <= best.t)) return false;
+  if (point.t == best.t && !(id < best.triangle)) return false;
+  const float callers_t = ray.callers_t(point.t);
   if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
-  // Adding +0 turns -0 into +0.
-  best = {t, callers_t, (u + Real(0.0F)).value, (v + Real(0.0F)).value, id};
+  const Real zero = 0.0F;  // adding it turns -0 into +0
+  best = {point.t, callers_t, (point.u + zero).value, (point.v + zero).value, id};
   return true;
 }
 

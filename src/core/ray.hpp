@@ -31,6 +31,8 @@ struct PreparedRay {
   Real shear[3];            ///< direction[kx] / direction[kz], [ky] / [kz], 1 / [kz]
   Real permuted_origin[3];  ///< origin in the order kx, ky, kz
   Real permuted_rest[3];    ///< what rounding a moved origin to float took off it
+  Wide wide_origin[3];      ///< the same in double, and not rounded
+  Wide wide_shear[3];
   bool moved = false;
   std::uint32_t k[3];
   std::uint32_t negative[3];  ///< 1: the direction is negative along this axis
@@ -109,11 +111,13 @@ struct PreparedRay {
                : (magnitude(d[1].value) >= magnitude(d[2].value) ? 1 : 2);
     k[0] = k[2] == 2 ? 0 : k[2] + 1;
     k[1] = k[0] == 2 ? 0 : k[0] + 1;
-    shear[0] = d[k[0]] / d[k[2]];
-    shear[1] = d[k[1]] / d[k[2]];
-    shear[2] = Real(1.0F) / d[k[2]];
+    wide_shear[0] = direction[k[0]] / direction[k[2]];
+    wide_shear[1] = direction[k[1]] / direction[k[2]];
+    wide_shear[2] = Wide(1.0) / direction[k[2]];
+    for (int i = 0; i < 3; ++i) shear[i] = static_cast<float>(wide_shear[i].value);
     for (int i = 0; i < 3; ++i) {
       permuted_origin[i] = origin[k[i]];
+      wide_origin[i] = from[k[i]];
       permuted_rest[i] =
           static_cast<float>((from[k[i]] - Wide(static_cast<double>(origin[k[i]].value))).value);
     }
@@ -127,6 +131,11 @@ struct PreparedRay {
   [[nodiscard]] ZKD_HOST_DEVICE Real from_origin(const float* corner, int i) const {
     const Real difference = Real(corner[k[i]]) * scale - permuted_origin[i];
     return moved ? difference - permuted_rest[i] : difference;
+  }
+
+  [[nodiscard]] ZKD_HOST_DEVICE Wide wide_from_origin(const float* corner, int i) const {
+    return Wide(static_cast<double>(corner[k[i]])) * Wide(static_cast<double>(scale.value)) -
+           wide_origin[i];
   }
 
   /// The caller's t of a hit at `t` in tree space.
