@@ -17,8 +17,9 @@ namespace zkd {
 ///     plane k     (origin[a] + k) * 2^exponent[a]        k = 0 .. 2^bits[a]
 ///     cell of x   floor(x * 2^-exponent[a]) - origin[a]  evaluated in double, exact
 ///
-/// |origin| and |origin + 2^bits| are at most 2^24. An axis along which nothing extends has no
-/// bits. Positions here are in the caller's units.
+/// |origin| and |origin + 2^bits| are at most 2^24, and cells are not so small that a plane would
+/// underflow in tree space (TreeView::scale). An axis along which nothing extends has no bits; its
+/// only cell has no planes and need not hold the box.
 ///
 /// A Morton code of `code_bits` bits interleaves the cell coordinates; level 0 is its most
 /// significant bit and splits axis `axis[0]`, and so on down.

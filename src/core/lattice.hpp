@@ -51,6 +51,26 @@ ZKD_HOST_DEVICE inline WideBox widen(const Box& box) {
   return wide;
 }
 
+/// log2 of TreeView::scale for a scene inside `bounds`.
+ZKD_HOST_DEVICE inline int scale_exponent(const Box& bounds) {
+  if (bounds.empty()) return 0;
+  double largest = 0.0;
+  for (int a = 0; a < 3; ++a) {
+    largest = larger(largest, static_cast<double>(magnitude(bounds.lo[a])));
+    largest = larger(largest, static_cast<double>(magnitude(bounds.hi[a])));
+  }
+  if (largest == 0.0) return 0;
+  const int exponent = exponent_of(largest);
+  if (exponent >= -16 && exponent < 32) return 0;
+  // 2^-126 and 2^127 are the smallest and largest powers of two that are normal floats.
+  return smaller(larger(-exponent, -126), 127);
+}
+
+/// Exponent of the smallest cell whose planes are floats in tree space too.
+ZKD_HOST_DEVICE inline std::int32_t finest_cell(int scale_exponent) {
+  return scale_exponent < 0 ? -149 - scale_exponent : -149;
+}
+
 /// The smallest power of two that is larger than `x` >= 0, as an exponent.
 ZKD_HOST_DEVICE inline int exponent_above(double x) { return exponent_of(x) + 1; }
 
@@ -115,17 +135,18 @@ ZKD_HOST_DEVICE inline bool settle(LatticeAxis& axis) {
   return true;
 }
 
-/// See zkd::stages::make_lattice. An inverted box gives a lattice without bits.
+/// See zkd::stages::make_lattice. An inverted box gives a lattice without bits; cells are not
+/// smaller than 2^finest.
 ZKD_HOST_DEVICE inline Lattice make_lattice(const WideBox& box, std::uint32_t code_bits,
-                                            AxisOrder order) {
+                                            AxisOrder order, std::int32_t finest) {
   Lattice lattice;
   LatticeAxis axes[3];
   for (int a = 0; a < 3; ++a) {
     if (!(box.lo[a] <= box.hi[a])) return lattice;
     const double extent = box.hi[a] - box.lo[a];
     const double largest = larger(magnitude(box.lo[a]), magnitude(box.hi[a]));
-    const int resolution = largest > 0.0 ? exponent_above(largest) - 24 : -149;
-    const int smallest = larger(resolution, -149);
+    const int resolution = largest > 0.0 ? exponent_above(largest) - 24 : finest;
+    const int smallest = larger(resolution, finest);
     const int side = extent > 0.0 ? exponent_above(extent) : smallest;
     axes[a] = {box.lo[a], box.hi[a], larger(side, smallest), smallest, 0};
   }
@@ -152,30 +173,16 @@ ZKD_HOST_DEVICE inline double plane_position(const Lattice& lattice, int a, std:
          power_of_two(lattice.exponent[a]);
 }
 
-/// log2 of TreeView::scale for a scene inside `bounds`.
-ZKD_HOST_DEVICE inline int scale_exponent(const Box& bounds) {
-  if (bounds.empty()) return 0;
-  double largest = 0.0;
-  for (int a = 0; a < 3; ++a) {
-    largest = larger(largest, static_cast<double>(magnitude(bounds.lo[a])));
-    largest = larger(largest, static_cast<double>(magnitude(bounds.hi[a])));
-  }
-  if (largest == 0.0) return 0;
-  const int exponent = exponent_of(largest);
-  if (exponent >= -16 && exponent < 32) return 0;
-  // 2^-126 and 2^127 are the smallest and largest powers of two that are normal floats.
-  return smaller(larger(-exponent, -126), 127);
-}
-
 /// The scene as queries and later stages see it: in tree space (TreeView::scale).
 struct SceneFrame {
   Box bounds;
   double scale = 1.0;
-  double largest = 0.0;  ///< magnitude of any coordinate
+  double largest = 0.0;        ///< magnitude of any coordinate
+  std::int32_t finest = -149;  ///< see finest_cell
 
   SceneFrame() = default;
   ZKD_HOST_DEVICE explicit SceneFrame(const Box& scene)
-      : scale(power_of_two(scale_exponent(scene))) {
+      : scale(power_of_two(scale_exponent(scene))), finest(finest_cell(scale_exponent(scene))) {
     for (int a = 0; a < 3; ++a) {
       bounds.lo[a] = scene.lo[a] * static_cast<float>(scale) + 0.0F;
       bounds.hi[a] = scene.hi[a] * static_cast<float>(scale) + 0.0F;

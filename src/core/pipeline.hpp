@@ -97,9 +97,9 @@ struct PrepareScene {
     state->root = Link{};
     state->crowded_trunks = 0;
     state->crowded_triangles = 0;
-    state->lattice = make_lattice(widen(state->report.bounds), bits, order);
-    state->coder = MortonCoder(state->lattice);
     state->frame = SceneFrame(state->report.bounds);
+    state->lattice = make_lattice(widen(state->report.bounds), bits, order, state->frame.finest);
+    state->coder = MortonCoder(state->lattice);
   }
 };
 
@@ -199,6 +199,7 @@ class MortonPipeline {
                                      valid(),
                                      options_.leaf_size,
                                      options_.axis_order,
+                                     &state_->frame,
                                      &state_->crowded_trunks,
                                      &state_->crowded_triangles,
                                      work.sort.other_values,  // free again after the sort

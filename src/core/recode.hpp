@@ -98,11 +98,12 @@ struct IncludeCentre {
 struct CrowdedLattice {
   const WideBox* centres;
   AxisOrder order;
+  const SceneFrame* frame;
   Lattice* lattices;
   MortonCoder* coders;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t c) const {
-    lattices[c] = make_lattice(centres[c], fine_bits, order);
+    lattices[c] = make_lattice(centres[c], fine_bits, order, frame->finest);
     coders[c] = MortonCoder(lattices[c]);
   }
 };
@@ -204,6 +205,7 @@ class SecondRound {
   Count triangles;
   std::uint32_t leaf_size;
   AxisOrder order;
+  const SceneFrame* frame;
   std::uint32_t* trunk_count;      ///< out: crowded trunks
   std::uint32_t* triangle_count;   ///< out: triangles in them
   std::uint32_t* first_scratch;    ///< room for one number per triangle
@@ -231,7 +233,8 @@ class SecondRound {
 
     backend.segmented_reduce(trunks, work.offsets, crowded, work.centres,
                              IncludeCentre{boxes, ids, work.first, work.offsets});
-    backend.for_each(trunks, CrowdedLattice{work.centres, order, work.lattices, work.coders});
+    backend.for_each(trunks,
+                     CrowdedLattice{work.centres, order, frame, work.lattices, work.coders});
     backend.for_each(crowded, RecodeTriangle{boxes, ids, members(), work.lattices, work.coders,
                                              work.sort.keys, work.sort.values});
     work.sort =

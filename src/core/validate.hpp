@@ -143,6 +143,14 @@ struct ValidateTriangle {
   }
 };
 
+/// Boxes that are already made: only their union.
+struct IncludeBox {
+  const Box* boxes;
+  ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {
+    include(report.bounds, boxes[triangle]);
+  }
+};
+
 /// A triangle goes into the tree if its box was written as not empty.
 struct IsListed {
   const Box* boxes;

@@ -110,7 +110,7 @@ Lattice make_lattice(const Box& bounds, std::uint32_t code_bits, AxisOrder order
     throw Error(ErrorCode::invalid_option, code_bits,
                 "code_bits is " + std::to_string(code_bits) + "; it must be 1 to 64");
   const cpu::FloatEnvironment environment;
-  return core::make_lattice(core::widen(bounds), code_bits, order);
+  return core::make_lattice(core::widen(bounds), code_bits, order, core::SceneFrame(bounds).finest);
 }
 
 void morton_encode(const cpu::Executor& executor, std::span<const Box> boxes,
@@ -157,9 +157,12 @@ std::uint32_t recode_crowded(const cpu::Executor& executor, std::span<const Box>
   backend.take(room, codes.size());
   std::uint32_t trunks = 0;
   std::uint32_t crowded = 0;
+  core::ValidationReport scene;
+  backend.reduce(exactly(boxes.size()), &scene, core::IncludeBox{boxes.data()});
+  const core::SceneFrame frame(scene.bounds);
   core::SecondRound<std::uint64_t, cpu::Backend> round{
-      boxes.data(), codes.data(), ids.data(), count,      leaf_size,
-      order,        &trunks,      &crowded,   room.first, room.offsets};
+      boxes.data(), codes.data(), ids.data(), count,      leaf_size,   order,
+      &frame,       &trunks,      &crowded,   room.first, room.offsets};
   if (enabled) round.run(backend);
 
   backend.for_each(count, core::Fill{crowd.data(), no_crowd});

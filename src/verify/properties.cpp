@@ -423,11 +423,6 @@ class Checker {
       const double below = centres[index][0].hi[node.axis];
       const double above = centres[index][1].lo[node.axis];
       if (below < plane && above >= plane) continue;
-      // Where scaling underflows, planes and centres are rounded to nearest, in order.
-      if (std::abs(plane) < 0x1p-126 && static_cast<float>(below) <= node.plane &&
-          static_cast<float>(above) >= node.plane) {
-        continue;
-      }
       report(5, "the plane of node ", index, ", ", axis_name[node.axis], " = ", node.plane,
              ", does not separate centres up to ", below, " from centres from ", above);
       return;
