@@ -40,9 +40,10 @@ struct MemoryRequirement {
   std::size_t workspace_bytes = 0;  ///< besides, until build returns
 };
 
-/// What build() allocates at most from its memory resource for `triangle_count` triangles, exact
-/// to the byte for the workspace. For References::all the number of references is not known
-/// beforehand: pass a bound (or a guess) in `reference_count`. O(1).
+/// What build() allocates at most from its memory resource for `triangle_count` triangles, whatever
+/// the scene: a resource that holds tree_bytes + workspace_bytes is never exhausted. Scenes without
+/// crowded trunks take less. For References::all the number of references is not known beforehand:
+/// pass a bound (or a guess) in `reference_count`. O(1).
 ///
 /// Throws Error invalid_option, unsupported_option, too_many_triangles.
 [[nodiscard]] ZKD_API MemoryRequirement memory_requirement(const cpu::Executor& executor,

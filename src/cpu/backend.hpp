@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cassert>
 #include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <memory_resource>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -214,7 +214,7 @@ class Backend {
   /// Lays out arrays that live until the build ends.
   template <class Layout, class... Counts>
   void take(Layout& layout, Counts... counts) {
-    if (blocks_used_ == max_blocks) throw std::logic_error("zkd: more workspaces than planned");
+    assert(blocks_used_ < max_blocks);
     blocks_[blocks_used_++] = lay_out(layout, counts...);
   }
 

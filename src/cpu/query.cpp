@@ -30,30 +30,35 @@ core::Candidate trace_one(const TreeView& tree, const TriangleView& triangles,
   return core::trace<any>(tree, triangles, ray, nullptr);
 }
 
+/// work(i) for every ray i. A pass counts in 32 bits: longer spans are done in several.
+template <class Work>
+void for_each_ray(const cpu::Threads& threads, std::size_t count, std::uint32_t at_once,
+                  Work work) noexcept {
+  constexpr std::size_t most = std::size_t{1} << 30;
+  for (std::size_t done = 0; done < count; done += most) {
+    const auto n = static_cast<std::uint32_t>(std::min(most, count - done));
+    threads.share(n, at_once, [=](cpu::Range range) {
+      for (std::size_t i = done + range.begin; i < done + range.end; ++i) work(i);
+    });
+  }
+}
+
 template <bool any, class Write>
 void trace_all(const cpu::Executor& executor, const TreeView& tree, const TriangleView& triangles,
                std::span<const Ray> rays, std::size_t count, std::span<TraversalCost> costs,
                Write write) noexcept {
   if (!costs.empty()) count = std::min(count, costs.size());
+  const auto trace_with = [=]<class Boxes>(std::size_t i) {
+    write(i,
+          core::trace<any, Boxes>(tree, triangles, rays[i], costs.empty() ? nullptr : &costs[i]));
+  };
   const cpu::Threads threads(executor);
-  // A pass counts in 32 bits: longer spans are done in several.
-  constexpr std::size_t most = 1u << 30;
-  for (std::size_t done = 0; done < count; done += most) {
-    const auto n = static_cast<std::uint32_t>(std::min(most, count - done));
-    const auto trace_range = [=]<class Boxes>(cpu::Range range) {
-      for (std::size_t i = done + range.begin; i < done + range.end; ++i)
-        write(i, core::trace<any, Boxes>(tree, triangles, rays[i],
-                                         costs.empty() ? nullptr : &costs[i]));
-    };
-    if (threads.avx2())
-      threads.share(n, rays_at_once, [=](cpu::Range range) {
-        trace_range.template operator()<cpu::Avx2BoxTest>(range);
-      });
-    else
-      threads.share(n, rays_at_once, [=](cpu::Range range) {
-        trace_range.template operator()<core::BoxTest>(range);
-      });
-  }
+  if (threads.avx2())
+    for_each_ray(threads, count, rays_at_once,
+                 [=](std::size_t i) { trace_with.template operator()<cpu::Avx2BoxTest>(i); });
+  else
+    for_each_ray(threads, count, rays_at_once,
+                 [=](std::size_t i) { trace_with.template operator()<core::BoxTest>(i); });
 }
 
 }  // namespace
@@ -90,20 +95,16 @@ void closest_hit_brute_force(const cpu::Executor& executor, const TreeView& tree
                              const TriangleView& triangles, std::span<const Ray> rays,
                              std::span<Hit> hits) noexcept {
   const std::size_t count = std::min(rays.size(), hits.size());
-  const cpu::Threads threads(executor);
-  threads.share(static_cast<std::uint32_t>(count), 1, [=](cpu::Range range) {
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      const core::PreparedRay ray(tree, rays[i]);
-      core::Candidate best;
-      for (std::uint32_t id = 0; ray.valid && id < triangles.triangle_count; ++id) {
-        const core::Corners corners = core::corners_of(triangles, id);
-        core::Candidate candidate = best;
-        // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
-        if (core::intersect(ray, corners, id, candidate) && core::is_valid(corners))
-          best = candidate;
-      }
-      hits[i] = core::to_hit(best);
+  for_each_ray(cpu::Threads(executor), count, 1, [=](std::size_t i) {
+    const core::PreparedRay ray(tree, rays[i]);
+    core::Candidate best;
+    for (std::uint32_t id = 0; ray.valid && id < triangles.triangle_count; ++id) {
+      const core::Corners corners = core::corners_of(triangles, id);
+      core::Candidate candidate = best;
+      // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
+      if (core::intersect(ray, corners, id, candidate) && core::is_valid(corners)) best = candidate;
     }
+    hits[i] = core::to_hit(best);
   });
 }
 
