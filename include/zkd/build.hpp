@@ -22,8 +22,8 @@ namespace zkd {
 /// with ids mapped, up to the order of ids within a leaf. No triangles, or none valid, is a valid
 /// empty tree.
 ///
-/// O(n) work for `once` (radix sort on a fixed number of digits) plus O(log n) a leaf; for `all`
-/// O((n + references) * depth).
+/// Work for n triangles: with `once` O(n * leaf_size), plus O(log n) a leaf (the sort has a fixed
+/// number of digits); with `all` O((n + references) * depth).
 ///
 /// Throws Error: index_out_of_range, non_finite_vertex, too_many_triangles, too_many_references,
 /// invalid_view, invalid_option, unsupported_option, backend_unavailable, out_of_memory. When it
@@ -34,9 +34,9 @@ namespace zkd {
 [[nodiscard]] ZKD_API Tree build(const cpu::Executor& executor, const TriangleView& triangles,
                                  const BuildOptions& options = {});
 
-/// Memory that a build of `triangle_count` triangles takes at most.
+/// Memory that a build takes at most, in bytes.
 struct MemoryRequirement {
-  std::size_t tree_bytes = 0;       ///< the finished tree, largest possible
+  std::size_t tree_bytes = 0;       ///< the finished tree
   std::size_t workspace_bytes = 0;  ///< besides, until build returns
 };
 

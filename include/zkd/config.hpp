@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Version and the two markers that let one source serve host and device.
+// The version, and the two markers that functions carry: where they run, and whether a program may
+// link to them.
 #pragma once
 
 #define ZKD_VERSION_MAJOR 0

@@ -20,17 +20,19 @@ enum class ErrorCode {
   too_many_triangles,   ///< more triangles than 31 bits count; offender: the count
   too_many_references,  ///< `all` needs more references than 31 bits count; offender: how many
   invalid_view,         ///< null pointer, odd stride or misaligned data; offender: see the message
-  invalid_option,       ///< an option is outside its documented range; offender: its value
-  unsupported_option,   ///< a valid option that this version does not build yet
-  backend_unavailable,  ///< the backend asked for is not linked, or no device answers
+  invalid_option,       ///< an option is outside its documented range; offender: its value, 0 for
+                        ///< one that is no integer
+  unsupported_option,   ///< a valid option that this version does not build yet; offender: 0
+  backend_unavailable,  ///< the backend asked for is not linked, or no device answers; offender: 0
   out_of_memory,        ///< the memory resource refused; offender: the bytes asked for
 };
 
 /// The name of `code` as written above, for logs. Static storage.
 ZKD_API const char* to_string(ErrorCode code) noexcept;
 
-/// What every throwing function of zkd throws. Nothing is leaked and no argument has been changed
-/// when it arrives.
+/// What every throwing function of zkd throws. When it arrives nothing is leaked. build() has not
+/// changed any argument; what a single stage (zkd/stages.hpp) left in its output spans is
+/// unspecified.
 class ZKD_API Error : public std::runtime_error {
  public:
   Error(ErrorCode code, std::uint64_t offender, const std::string& message);
@@ -38,7 +40,7 @@ class ZKD_API Error : public std::runtime_error {
   /// Which kind of error; each kind has its own code.
   [[nodiscard]] ErrorCode code() const noexcept { return code_; }
 
-  /// The first offender (lowest index), as the code's comment says.
+  /// What the code's comment says; of several triangles, the lowest index.
   [[nodiscard]] std::uint64_t offender() const noexcept { return offender_; }
 
  private:

@@ -29,13 +29,14 @@ inline constexpr std::uint64_t max_count = 0x7FFFFFFFu;
 ///
 /// The arrays must outlive every build and query that is given the view, and must not change
 /// between a build and the queries on its tree. Positions are three floats each, `position_stride`
-/// bytes apart (a multiple of 4, at least 12; data aligned to 4). Without indices the view is a
-/// soup: triangle i has the positions 3i, 3i+1, 3i+2.
+/// bytes apart (a multiple of 4, at least 12; data aligned to 4). Triangle i has the indices 3i,
+/// 3i+1, 3i+2, each below `position_count`. Without indices the view is a soup: triangle i has the
+/// positions 3i, 3i+1, 3i+2.
 struct TriangleView {
   const float* positions = nullptr;
   std::size_t position_count = 0;
   std::size_t position_stride = sizeof(glm::vec3);  ///< bytes from one position to the next
-  const std::uint32_t* indices = nullptr;           ///< null: soup
+  const std::uint32_t* indices = nullptr;           ///< 3 * triangle_count; null: soup
   std::size_t triangle_count = 0;
 
   TriangleView() = default;
@@ -81,7 +82,7 @@ struct TriangleView {
   }
 };
 
-/// An axis-aligned box, closed. Empty when `lo > hi` on some axis.
+/// An axis-aligned box, closed: its sides belong to it. Empty when `lo > hi` on some axis.
 struct Box {
   float lo[3] = {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(),
                  std::numeric_limits<float>::infinity()};

@@ -58,8 +58,9 @@ struct BuildOptions {
   Builder builder = Builder::morton;
   Quality quality = Quality::fast;
 
-  /// `once` builds in a third of the time and memory of `all`; `all` has what only a strict
-  /// kd-tree gives: disjoint cells.
+  /// `once` takes about a tenth of the time to build that `all` takes and two thirds of the memory
+  /// (Bunny, Sibenik, Conference, Dragon). `all` has what only a strict kd-tree gives: disjoint
+  /// cells.
   References references = References::once;
 
   /// References per triangle that `budget` may use; finite, at least 1.
@@ -70,22 +71,25 @@ struct BuildOptions {
   /// stage grows with it.
   std::uint32_t leaf_size = 4;
 
-  /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. 32-bit
-  /// codes give trees as good as 63-bit ones up to a million triangles and sort in half the time.
-  /// Fewer may be used: an axis gets no bits below the resolution of its floats.
+  /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. With 32
+  /// bits rays visit as many nodes as with 63, within 1 % (Bunny, Conference, Dragon), and the sort
+  /// takes little more than half the time. Fewer may be used: an axis gets no bits below the
+  /// resolution of its floats.
   std::uint32_t code_bits = 0;
 
-  /// By extent: Conference needs 22 node visits per ray instead of 30.
+  /// By extent: fewer triangle tests per ray than cyclic on each of seven scenes (1 to 11 %), and 8
+  /// to 11 % fewer node visits on scanned models, though 5 to 9 % more in rooms.
   AxisOrder axis_order = AxisOrder::by_extent;
 
   /// Codes the triangles of a crowded trunk (one code, more than leaf_size triangles) again, in
-  /// their own box, with 32 more bits. Costs nothing where no trunk is crowded; without it a small
-  /// model in a large scene becomes one leaf.
+  /// their own box, with 32 more bits. Costs one pass over the codes where no trunk is crowded;
+  /// without it a small model in a large scene becomes one leaf.
   bool recode_crowded = true;
 
   InvalidTriangles invalid_triangles = InvalidTriangles::error;
 
-  /// Fills Statistics::depth and ::sah_cost: one more pass over the nodes.
+  /// Fills Statistics::depth, ::largest_leaf and ::sah_cost: one more pass over the nodes, on one
+  /// thread, for which most programs have no use.
   bool measure_quality = false;
 };
 

@@ -34,7 +34,7 @@
 
 namespace zkd {
 
-/// The nearest hit along `ray`, or nothing. O(depth) expected.
+/// The nearest hit along `ray`, or nothing. O(depth) for most rays, O(tree) at worst.
 [[nodiscard]] ZKD_API std::optional<Hit> closest_hit(const TreeView& tree,
                                                      const TriangleView& triangles,
                                                      const Ray& ray) noexcept;
@@ -47,14 +47,14 @@ namespace zkd {
 /// answers do not.
 struct TraversalCost {
   std::uint32_t node_visits = 0;  ///< inner nodes whose two boxes were tested
-  std::uint32_t triangle_tests = 0;
+  std::uint32_t triangle_tests = 0;  ///< a triangle counts once for each leaf it was tested in
 };
 
 /// closest_hit for each ray, on all threads of the executor: hits[i] belongs to rays[i]; a miss has
 /// triangle == no_triangle, t == infinity, u == v == 0. Blocks until done.
 ///
-/// `hits` (and `costs`, unless empty) must be as long as `rays`; a shorter one ends the work at its
-/// length. Spans must not overlap.
+/// `hits` (and `costs`, unless empty) should be as long as `rays`; a shorter one ends the work at
+/// its length. Spans must not overlap.
 ZKD_API void closest_hit(const cpu::Executor& executor, const TreeView& tree,
                          const TriangleView& triangles, std::span<const Ray> rays,
                          std::span<Hit> hits, std::span<TraversalCost> costs = {}) noexcept;

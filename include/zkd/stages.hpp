@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The stages of the Morton builder, one public function each, in the order of the poster. build()
-// gives the bytes of their composition; researchers swap or time one, tests use the same door.
+// Stages 1 to 9 of the Morton builder, one public function each, in the order of the poster: from
+// triangles to linked nodes with planes. (References and tight boxes, 10 and 11, need a tree to
+// write to: build().) build() gives the bytes of their composition. They are there to time one, to
+// put another in its place, and to test each by itself.
 //
 // Every function dispatches on the executor it is given, works on spans the caller owns (host
 // memory for cpu::Executor), runs on all threads of the executor, and blocks until done. Scratch
-// comes from the executor's memory. Spans must not overlap unless it says so; a span of the wrong
-// length is ErrorCode::invalid_view. All throw Error out_of_memory.
+// comes from the executor's memory. Spans must not overlap. n is the number of triangles that the
+// function is given.
+//
+// All throw Error: invalid_view for a span of the wrong length, invalid_option for a number outside
+// its range, too_many_triangles for spans longer than max_count, out_of_memory; beyond those, what
+// each says. Values that contradict each other (codes not sorted, a level that is not that of its
+// trunks) are not found out.
 #pragma once
 
 #include <cstdint>
@@ -37,14 +44,16 @@ struct SceneSummary {
 ZKD_API SceneSummary triangle_boxes(const cpu::Executor& executor, const TriangleView& triangles,
                                     InvalidTriangles invalid, std::span<Box> boxes);
 
-/// Stage 2, the lattice over `bounds` with `code_bits` bits (1 to 64) at most, axes ordered as
-/// `order` says. An empty box gives a lattice without bits. O(1), no executor.
+/// Stage 2, the lattice over `bounds` (in the caller's units) with `code_bits` bits (1 to 64) at
+/// most, dealt to the axes as `order` says. An empty box gives a lattice without bits. O(1), no
+/// executor. Throws Error invalid_option.
 [[nodiscard]] ZKD_API Lattice make_lattice(const Box& bounds, std::uint32_t code_bits,
                                            AxisOrder order = AxisOrder::by_extent);
 
 /// Stage 3, Morton encoding: codes of the centres of the boxes that are not empty, in their order,
-/// and their indices in `ids`. Both spans as long as there are such boxes. Codes are right-aligned:
-/// lattice.code_bits low bits. The 32-bit form needs code_bits <= 32. O(n).
+/// and the indices of those boxes in `ids`. Both spans are as long as there are such boxes
+/// (SceneSummary::valid); the centres must lie inside the lattice. Codes are right-aligned: the low
+/// lattice.code_bits bits. The 32-bit form needs lattice.code_bits <= 32. O(n).
 ZKD_API void morton_encode(const cpu::Executor& executor, std::span<const Box> boxes,
                            const Lattice& lattice, std::span<std::uint32_t> codes,
                            std::span<std::uint32_t> ids);
@@ -52,15 +61,15 @@ ZKD_API void morton_encode(const cpu::Executor& executor, std::span<const Box> b
                            const Lattice& lattice, std::span<std::uint64_t> codes,
                            std::span<std::uint32_t> ids);
 
-/// Stage 4, stable radix sort of (code, value) pairs by the low `bits` bits of the codes, in place
-/// as seen from outside. Digits that are equal in all codes cost nothing. Returns the passes that
-/// were left out. O(n * bits / digit).
+/// Stage 4, stable radix sort of (code, value) pairs by the low `bits` bits of the codes; the
+/// result is in the same two spans. One pass for every 8 bits; a digit that is equal in all codes
+/// needs none. Returns how many passes were left out. O(n * bits).
 ZKD_API std::uint32_t radix_sort(const cpu::Executor& executor, std::span<std::uint32_t> codes,
                                  std::span<std::uint32_t> values, std::uint32_t bits = 32);
 ZKD_API std::uint32_t radix_sort(const cpu::Executor& executor, std::span<std::uint64_t> codes,
                                  std::span<std::uint32_t> values, std::uint32_t bits = 64);
 
-/// The key of a trunk: the Morton code and, behind it, the code of the second round.
+/// The key of a trunk or triangle: the Morton code, followed by the code of the second round.
 ///
 ///     bit 127 .. 64   code, aligned to the left: level 0 is bit 127
 ///     bit  63 .. 32   second-round code, aligned to the left; 0 where the trunk is not crowded
@@ -83,43 +92,48 @@ struct TrunkKey {
 /// Levels below this one split the scene's lattice, the others a crowded trunk's.
 inline constexpr std::uint32_t first_fine_level = 64;
 
-/// Stage 5, crowded trunks. Triangles that share a code with more than `leaf_size` others less one
-/// are coded again with up to 32 bits on a lattice over their own centres, and sorted by that code
-/// within their trunk. On return keys[i] is the key of ids[i], sorted; crowd[i] is the number of
-/// the crowded trunk (from 0) of position i or no_crowd.
-///
-/// `codes` and `ids` are what the sort left; ids are permuted within crowded trunks. Returns the
-/// number of crowded trunks; their lattices are written to `lattices` in order, as many as fit.
-/// With `enabled` false, keys are made and nothing else. O(n).
+/// In no crowded trunk.
 inline constexpr std::uint32_t no_crowd = 0xFFFFFFFFu;
+
+/// Stage 5, crowded trunks. Where more than `leaf_size` triangles share one code (a crowded trunk),
+/// they are coded again, with up to 32 bits on a lattice over their own centres, and sorted by that
+/// code among themselves. On return keys[i] is the key of triangle ids[i], ascending, and crowd[i]
+/// the number of its crowded trunk, counted from 0 in the order of the codes, or no_crowd.
+///
+/// `boxes` are those of all triangles, `codes` and `ids` what the sort left; ids are permuted
+/// within crowded trunks. Returns the number of crowded trunks, n / (leaf_size + 1) at most; their
+/// lattices are written to `lattices` in order, as many as fit. With `enabled` false, keys are made
+/// and nothing else. O(n).
 ZKD_API std::uint32_t recode_crowded(const cpu::Executor& executor, std::span<const Box> boxes,
                                      const Lattice& lattice, std::span<const std::uint64_t> codes,
                                      std::span<std::uint32_t> ids, std::uint32_t leaf_size,
                                      AxisOrder order, bool enabled, std::span<TrunkKey> keys,
                                      std::span<std::uint32_t> crowd, std::span<Lattice> lattices);
 
-/// Stage 6, trunks. Conceptually, the largest nodes of the complete binary tree over all keys that
-/// hold at most `leaf_size` triangles (or one key). first[t] becomes the position of the first
-/// triangle of trunk t. `first` is as long as `keys`; returns how many were written.
-/// O(n * leaf_size).
+/// Stage 6, trunks: the largest nodes of the conceptual tree (the complete binary tree over all
+/// keys) that hold at most `leaf_size` triangles, 1 to 1024, or a single key. first[t] becomes the
+/// position of the first triangle of trunk t. `first` is as long as `keys`; returns the number of
+/// trunks, the rest of `first` is unspecified. O(n * leaf_size).
 ZKD_API std::uint32_t find_trunks(const cpu::Executor& executor, std::span<const TrunkKey> keys,
                                   std::uint32_t leaf_size, std::span<std::uint32_t> first);
 
 /// Stage 7, essential nodes. levels[j] becomes the level at which trunks j and j + 1 first differ:
-/// the essential node between them. `trunk_keys` holds the key of each trunk's first triangle;
-/// levels is one shorter. O(trunks).
+/// the essential node between them. `trunk_keys` holds the key of each trunk's first triangle,
+/// keys[first[t]]; `levels` is one shorter. O(trunks).
 ZKD_API void essential_nodes(const cpu::Executor& executor, std::span<const TrunkKey> trunk_keys,
                              std::span<std::uint8_t> levels);
 
 /// Stage 8, path compression: links every essential node and every trunk directly to the essential
 /// node above it, leaving out the redundant nodes between. children[2j] and [2j + 1] become the
-/// links of node j. Returns the root. O(trunks * log trunks) at worst, searches are local.
+/// links of node j, below and above its plane. Returns the root: a leaf for one trunk, none for no
+/// trunk. O(trunks * log trunks) at worst; most nodes are settled by looking at a few neighbours.
 ZKD_API Link path_compression(const cpu::Executor& executor, std::span<const TrunkKey> trunk_keys,
                               std::span<const std::uint8_t> levels, std::span<Link> children);
 
 /// Stage 9, split planes: axis and position (in the caller's units, exact) of each essential node,
-/// from the key of the trunk above the plane, cut behind the level of the node. `crowd[t]` is the
-/// crowded trunk that trunk t belongs to, or no_crowd. O(trunks).
+/// from the key of trunk j + 1, the first above the plane, with the bits after the node's level
+/// cleared. crowd[t] is the crowded trunk that trunk t belongs to, or no_crowd: stage 5's at
+/// position first[t]. `lattices` are those of stage 5, all of them. O(trunks).
 ZKD_API void split_planes(const cpu::Executor& executor, std::span<const TrunkKey> trunk_keys,
                           std::span<const std::uint8_t> levels,
                           std::span<const std::uint32_t> crowd, const Lattice& lattice,

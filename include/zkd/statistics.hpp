@@ -10,7 +10,7 @@
 
 namespace zkd {
 
-/// The stages of a build, in order. (DESIGN: validate, encode, sort, ... as in the poster.)
+/// The stages of a build, in the order of the poster. Validation is timed with the lattice.
 enum class Stage : std::uint8_t {
   validate,          ///< checks, triangle boxes, scene box, lattice
   encode,            ///< Morton codes
@@ -38,14 +38,16 @@ enum class Skip : std::uint8_t {
   count,
 };
 
+/// "radix passes", "flat axes", ... Static storage.
 ZKD_API const char* to_string(Skip skip) noexcept;
 
-/// One line per skip: whether it was taken and how much work it left out.
+/// One skip: whether it was taken and how much work it left out.
 struct SkipReport {
   bool taken = false;
   std::uint32_t amount = 0;  ///< in the unit named at the enumerator
 };
 
+/// What one build found, made and took. Bytes are as asked of the memory resource.
 struct Statistics {
   std::uint64_t triangles = 0;           ///< as given
   std::uint64_t skipped_zero_area = 0;   ///< exactly zero area: never hit, not in the tree
@@ -69,7 +71,8 @@ struct Statistics {
   std::uint64_t tree_bytes = 0;       ///< the finished tree
   std::uint64_t workspace_bytes = 0;  ///< most that was held besides, freed when build returns
 
-  double total_ms = 0.0;  ///< wall time of the build, allocation included
+  /// Wall time of the build, allocation and measure_quality included: more than stage_ms adds up to.
+  double total_ms = 0.0;
   std::array<double, static_cast<std::size_t>(Stage::count)> stage_ms{};
   std::array<SkipReport, static_cast<std::size_t>(Skip::count)> skips{};
 

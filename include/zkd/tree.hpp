@@ -16,7 +16,8 @@
 
 namespace zkd {
 
-/// Names a child: an inner node or a leaf.
+/// Names a child: an inner node or a leaf. `none` counts as a leaf too: where a link may be none,
+/// ask is_none() first.
 ///
 ///     bit 31   1: leaf, 0: inner node
 ///     30..0    index into TreeView::nodes, or number of the leaf
@@ -49,7 +50,7 @@ struct Link {
 ///          56  plane      position of the split plane, exact
 ///          60  axis       0, 1, 2
 struct alignas(64) Node {
-  float bounds[3][4];  ///< tight boxes of both children
+  float bounds[3][4];  ///< tight boxes of both children; +inf, -inf for a leaf that lists nothing
   Link child[2];       ///< below and above the plane
   float plane;
   std::uint32_t axis;
@@ -69,7 +70,7 @@ struct TreeView {
   const Node* nodes = nullptr;                  ///< leaf_count - 1 of them (none for an empty tree)
   const std::uint32_t* leaf_offsets = nullptr;  ///< leaf_count + 1; leaf i lists references
                                                 ///< [leaf_offsets[i], leaf_offsets[i + 1])
-  const std::uint32_t* references = nullptr;    ///< triangle ids
+  const std::uint32_t* references = nullptr;    ///< triangle ids, leaf by leaf
   std::uint32_t leaf_count = 0;
   std::uint32_t reference_count = 0;
   Link root;   ///< a node; a leaf if there is only one; none if the tree is empty
@@ -89,7 +90,8 @@ struct TreeView {
 
 /// Owns a finished tree in host memory: two blocks (nodes with leaf offsets, references) from the
 /// memory resource it was built with.
-/// Movable, not copyable by accident: see clone(). Reading one tree from several threads is safe.
+/// Movable, not copyable by accident: see clone(). A tree moved from is an empty one. Reading one
+/// tree from several threads is safe.
 class ZKD_API Tree {
  public:
   /// An empty tree: every ray misses.

@@ -17,68 +17,69 @@
 
 namespace zkd::core {
 
+#if defined(__CUDA_ARCH__)
+__device__ inline float rounded_sum(float a, float b) { return __fadd_rn(a, b); }
+__device__ inline float rounded_difference(float a, float b) { return __fsub_rn(a, b); }
+__device__ inline float rounded_product(float a, float b) { return __fmul_rn(a, b); }
+__device__ inline float rounded_quotient(float a, float b) { return __fdiv_rn(a, b); }
+__device__ inline double rounded_sum(double a, double b) { return __dadd_rn(a, b); }
+__device__ inline double rounded_difference(double a, double b) { return __dsub_rn(a, b); }
+__device__ inline double rounded_product(double a, double b) { return __dmul_rn(a, b); }
+__device__ inline double rounded_quotient(double a, double b) { return __ddiv_rn(a, b); }
+#else
 template <class T>
-struct Rounded;
+ZKD_HOST_DEVICE inline T rounded_sum(T a, T b) {
+  return a + b;
+}
+template <class T>
+ZKD_HOST_DEVICE inline T rounded_difference(T a, T b) {
+  return a - b;
+}
+template <class T>
+ZKD_HOST_DEVICE inline T rounded_product(T a, T b) {
+  return a * b;
+}
+template <class T>
+ZKD_HOST_DEVICE inline T rounded_quotient(T a, T b) {
+  return a / b;
+}
+#endif
+ZKD_HOST_DEVICE inline float rounded_fma(float a, float b, float c) {
+  return __builtin_fmaf(a, b, c);
+}
+ZKD_HOST_DEVICE inline double rounded_fma(double a, double b, double c) {
+  return __builtin_fma(a, b, c);
+}
 
-template <>
-struct Rounded<float> {
-  float value = 0.0F;
+/// A number each of whose operations is rounded once, to nearest.
+template <class T>
+struct Rounded {
+  T value = T(0);
 
   Rounded() = default;
-  ZKD_HOST_DEVICE constexpr Rounded(float x) : value(x) {}
+  ZKD_HOST_DEVICE constexpr Rounded(T x) : value(x) {}
 
-#if defined(__CUDA_ARCH__)
-  friend __device__ Rounded operator+(Rounded a, Rounded b) { return __fadd_rn(a.value, b.value); }
-  friend __device__ Rounded operator-(Rounded a, Rounded b) { return __fsub_rn(a.value, b.value); }
-  friend __device__ Rounded operator*(Rounded a, Rounded b) { return __fmul_rn(a.value, b.value); }
-  friend __device__ Rounded operator/(Rounded a, Rounded b) { return __fdiv_rn(a.value, b.value); }
-  friend __device__ Rounded fma(Rounded a, Rounded b, Rounded c) {
-    return __fmaf_rn(a.value, b.value, c.value);
+  friend ZKD_HOST_DEVICE Rounded operator+(Rounded a, Rounded b) {
+    return rounded_sum(a.value, b.value);
   }
-#else
-  friend ZKD_HOST_DEVICE Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
-  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
-  friend ZKD_HOST_DEVICE Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
-  friend ZKD_HOST_DEVICE Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
+  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a, Rounded b) {
+    return rounded_difference(a.value, b.value);
+  }
+  friend ZKD_HOST_DEVICE Rounded operator*(Rounded a, Rounded b) {
+    return rounded_product(a.value, b.value);
+  }
+  friend ZKD_HOST_DEVICE Rounded operator/(Rounded a, Rounded b) {
+    return rounded_quotient(a.value, b.value);
+  }
   friend ZKD_HOST_DEVICE Rounded fma(Rounded a, Rounded b, Rounded c) {
-    return __builtin_fmaf(a.value, b.value, c.value);
+    return rounded_fma(a.value, b.value, c.value);
   }
-#endif
   friend ZKD_HOST_DEVICE Rounded operator-(Rounded a) { return -a.value; }
   friend ZKD_HOST_DEVICE bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
   friend ZKD_HOST_DEVICE bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
   friend ZKD_HOST_DEVICE bool operator<=(Rounded a, Rounded b) { return a.value <= b.value; }
   friend ZKD_HOST_DEVICE bool operator>=(Rounded a, Rounded b) { return a.value >= b.value; }
   friend ZKD_HOST_DEVICE bool operator==(Rounded a, Rounded b) { return a.value == b.value; }
-};
-
-template <>
-struct Rounded<double> {
-  double value = 0.0;
-
-  Rounded() = default;
-  ZKD_HOST_DEVICE constexpr Rounded(double x) : value(x) {}
-
-#if defined(__CUDA_ARCH__)
-  friend __device__ Rounded operator+(Rounded a, Rounded b) { return __dadd_rn(a.value, b.value); }
-  friend __device__ Rounded operator-(Rounded a, Rounded b) { return __dsub_rn(a.value, b.value); }
-  friend __device__ Rounded operator*(Rounded a, Rounded b) { return __dmul_rn(a.value, b.value); }
-  friend __device__ Rounded operator/(Rounded a, Rounded b) { return __ddiv_rn(a.value, b.value); }
-  friend __device__ Rounded fma(Rounded a, Rounded b, Rounded c) {
-    return __fma_rn(a.value, b.value, c.value);
-  }
-#else
-  friend ZKD_HOST_DEVICE Rounded operator+(Rounded a, Rounded b) { return a.value + b.value; }
-  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a, Rounded b) { return a.value - b.value; }
-  friend ZKD_HOST_DEVICE Rounded operator*(Rounded a, Rounded b) { return a.value * b.value; }
-  friend ZKD_HOST_DEVICE Rounded operator/(Rounded a, Rounded b) { return a.value / b.value; }
-  friend ZKD_HOST_DEVICE Rounded fma(Rounded a, Rounded b, Rounded c) {
-    return __builtin_fma(a.value, b.value, c.value);
-  }
-#endif
-  friend ZKD_HOST_DEVICE Rounded operator-(Rounded a) { return -a.value; }
-  friend ZKD_HOST_DEVICE bool operator<(Rounded a, Rounded b) { return a.value < b.value; }
-  friend ZKD_HOST_DEVICE bool operator>(Rounded a, Rounded b) { return a.value > b.value; }
 };
 
 using Real = Rounded<float>;

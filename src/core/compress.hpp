@@ -22,7 +22,7 @@ struct Parent {
   [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t side() const { return bits & 1u; }
 };
 
-/// Where links go: children of node j to links[stride * j] and the next, ways up to two arrays.
+/// Where links go: the children of node j to links[stride * j] and the next, ways up to two arrays.
 struct LinkWriter {
   Link* links;
   std::size_t stride;         ///< in links: 2, or what a node has
@@ -34,8 +34,9 @@ struct LinkWriter {
 
   ZKD_HOST_DEVICE void load() { trunks = *trunk_count; }
 
-  /// Links `child`, which covers trunks left..right, to the node above it: of the two essential
-  /// nodes at its ends the one with the longer prefix.
+  /// Links `child`, which covers trunks left..right, to the node above it: the essential node where
+  /// it parts from the trunk before it, or the one where it parts from the trunk after it, whichever
+  /// has the longer prefix and so lies lower.
   ZKD_HOST_DEVICE void link(Link child, std::uint32_t left, std::uint32_t right,
                             const std::uint8_t* levels) const {
     const bool has_left = left > 0;
@@ -55,6 +56,7 @@ struct LinkWriter {
   }
 };
 
+/// Trunk t: a leaf.
 struct LinkTrunk {
   const std::uint8_t* levels;
   LinkWriter writer;
@@ -66,6 +68,7 @@ struct LinkTrunk {
   }
 };
 
+/// Essential node j: which trunks it covers, hence which node is above it.
 struct LinkEssentialNode {
   const TrunkKey* trunk_keys;
   const std::uint8_t* levels;
@@ -73,14 +76,14 @@ struct LinkEssentialNode {
 
   ZKD_HOST_DEVICE void load() { writer.load(); }
 
-  /// Neighbours to look at before searching the keys.
+  /// Neighbours to look at before searching the keys; a power of two, for run_length.
   static constexpr std::uint32_t near_by = 16;
 
   /// The trunks below a node are those with its prefix: neighbours, since keys are sorted.
   ZKD_HOST_DEVICE void operator()(std::uint32_t node) const {
     const std::uint32_t level = levels[node];
     const std::uint32_t before = node;                      // trunks before the two that part here
-    const std::uint32_t behind = writer.trunks - node - 2;  // and behind them
+    const std::uint32_t behind = writer.trunks - node - 2;  // and after them
     // Most nodes have few trunks below: a look at the neighbours' levels settles those.
     std::uint32_t left = 0;
     while (left < before && left < near_by && levels[node - left - 1] > level) ++left;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Stage 7, essential nodes: the prefixes at which neighbouring trunks first differ. They are the
-// only inner nodes: of the conceptual tree's other nodes each has one child with triangles.
+// only inner nodes: every other node of the conceptual tree is empty, lies in a trunk, or has
+// triangles below one of its children only.
 #pragma once
 
 #include <cstdint>

@@ -37,7 +37,7 @@ ZKD_HOST_DEVICE inline TrunkKey lowest_below(const TrunkKey& key, std::uint32_t 
   return {key.code, fine == 0 ? 0 : key.fine & (~0ull << (64 - fine))};
 }
 
-/// The highest.
+/// The highest key below that node.
 ZKD_HOST_DEVICE inline TrunkKey highest_below(const TrunkKey& key, std::uint32_t level) {
   if (level < first_fine_level) return {key.code | (~0ull >> level), ~0ull};
   return {key.code, key.fine | (~0ull >> (level - first_fine_level))};
@@ -60,8 +60,9 @@ struct SortedKeys {
   }
 };
 
-/// The same in one number, for codes of at most 32 bits: the code aligned to the left, and behind
-/// it the second-round code. Levels differ from those of a TrunkKey, but compare in the same way.
+/// The same in one number, for codes of at most 32 bits: the code aligned to the left, then the
+/// second-round code. Levels differ from those of a TrunkKey, but compare in the same way, which is
+/// all that finding trunks needs, with half the work.
 struct PackedKeys {
   SortedKeys<std::uint32_t> keys;
 
@@ -77,7 +78,7 @@ ZKD_HOST_DEVICE inline std::uint32_t parting_level(std::uint64_t a, std::uint64_
   return a != b ? leading_zeros(a ^ b) : level_count;
 }
 
-/// Writes down the i-th key.
+/// Writes down the i-th key, for those who call the stage by itself.
 template <class Code>
 struct WriteKey {
   SortedKeys<Code> keys;

@@ -20,8 +20,9 @@ struct SplitPlane {
   double position;
 };
 
-/// The plane of a node of this level below which `above` is a key on the upper side. Cut behind
-/// the level, that key names the first cell above the plane.
+/// The plane of a node of this level; `above` is the code of a trunk on its upper side, aligned to
+/// the left. There the bit of the level is 1: with the bits after it cleared, the code names the
+/// first cell above the plane.
 ZKD_HOST_DEVICE inline SplitPlane split_plane(const Lattice& lattice, const MortonCoder& coder,
                                               std::uint64_t above, std::uint32_t level) {
   const std::uint64_t first = above & (~0ull << (63 - level));
@@ -45,7 +46,7 @@ struct CrowdByPosition {
   }
 };
 
-/// The same, listed for every trunk.
+/// The same, listed for every trunk: for those who call the stage by itself.
 struct CrowdByTrunk {
   const std::uint32_t* crowd;
   const Lattice* lattices;
@@ -82,7 +83,7 @@ struct PlaceSplitPlane {
     if (level < first_fine_level) {
       plane = split_plane(*lattice, *coder, above.code, level);
     } else {
-      // Second-round codes are the upper half of `fine`, and of their split_plane's.
+      // Second-round codes are aligned to the left of 64 bits too.
       plane = crowd.plane(node + 1, above.fine, level - first_fine_level);
     }
     writer.axes[writer.stride * node] = plane.axis;

@@ -178,7 +178,8 @@ struct CellWalk {
           within = within &&
                    (split || (cell.lo[a] == placed.box.lo[a] && cell.hi[a] == placed.box.hi[a]));
         }
-        // A triangle that crosses a plane where nothing of it is cut off is on both sides.
+        // Where the cell cut nothing off the triangle along the two other axes, the triangle spans
+        // it along this one, and is on both sides of the plane.
         const bool in_lower = within || placed.touches(lower);
         const bool in_upper = within || placed.touches(upper);
         if (in_lower && in_upper) {
@@ -258,7 +259,7 @@ struct WriteReferences {
   }
 };
 
-/// offset of leaf `leaf` among references sorted by leaf; a leaf may be empty.
+/// The offset of leaf `leaf` among references sorted by leaf; a leaf may be empty.
 struct LeafOffset {
   const std::uint32_t* leaves;
   const std::uint32_t* reference_count;

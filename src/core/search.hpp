@@ -24,14 +24,14 @@ ZKD_HOST_DEVICE inline std::uint32_t first_not_below(const std::uint32_t* number
   return low;
 }
 
-/// Index of the last of `count` ascending numbers that is at most `value`; the first is.
+/// Index of the last of `count` ascending numbers that is at most `value`. The first must be.
 ZKD_HOST_DEVICE inline std::uint32_t last_at_or_before(const std::uint32_t* numbers,
                                                        std::uint32_t count, std::uint32_t value) {
   return first_not_below(numbers, count, value + 1) - 1;
 }
 
-/// How far `holds(1), holds(2), ...` stays true, at most `most` steps: gallop from `step` on, a
-/// power of two, then bisect.
+/// How many of `holds(1), holds(2), ... holds(most)` are true, given that none is after the first
+/// that is not: gallops, from `step` (a power of two) on, then bisects. O(log of the result).
 template <class Predicate>
 ZKD_HOST_DEVICE inline std::uint32_t run_length(std::uint32_t most, std::uint32_t step,
                                                 const Predicate& holds) {

@@ -12,10 +12,10 @@ namespace zkd::core {
 
 /// Whether a trunk begins with triangle i.
 ///
-/// Neighbours i - 1 and i part at some node of the conceptual tree. That node stays a node, and a
-/// trunk begins at i, if it holds more than leaf_size triangles: if leaf_size + 1 triangles in a
-/// row, i - 1 and i among them, all lie below it. Looking at leaf_size rows of keys answers that
-/// without knowing the tree.
+/// Neighbours i - 1 and i part at some node of the conceptual tree. A trunk begins at i exactly
+/// when that node is too large to be a leaf, that is, when some leaf_size + 1 triangles in a row,
+/// i - 1 and i among them, all lie below it. There are leaf_size such rows at most, and the first
+/// and last key of each tell: no tree has to be known. Triangles of equal keys never part.
 template <class Keys>
 struct BeginsTrunk {
   Keys keys;

@@ -20,11 +20,13 @@ enum class InstructionSet {
 /// may be used by several threads at once if its memory resource may.
 struct Executor {
   /// OpenMP threads of a call; 0: as many as OpenMP would take (OMP_NUM_THREADS, or all cores).
+  /// build() throws invalid_option for a negative number; everything else takes it for 0.
   int threads = 0;
 
-  /// Everything a call allocates comes from here and nothing from anywhere else; null: the default
-  /// resource (std::pmr::get_default_resource()). It must outlive the trees built with it. All
-  /// calls to it come from the calling thread.
+  /// All arrays of a call come from here; null: the default resource at the time of the call
+  /// (std::pmr::get_default_resource()). Only what OpenMP keeps for its threads and the text of an
+  /// Error come from elsewhere. Not owned; it must outlive the trees built with it. It is only ever
+  /// called from the calling thread.
   std::pmr::memory_resource* memory = nullptr;
 
   InstructionSet instructions = InstructionSet::automatic;
