@@ -46,7 +46,7 @@ namespace zkd {
 /// Work one ray caused. Counts may differ between instruction sets by rounding in box tests;
 /// answers do not.
 struct TraversalCost {
-  std::uint32_t node_visits = 0;  ///< inner nodes whose two boxes were tested
+  std::uint32_t node_visits = 0;     ///< inner nodes whose two boxes were tested
   std::uint32_t triangle_tests = 0;  ///< a triangle counts once for each leaf it was tested in
 };
 

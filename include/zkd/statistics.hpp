@@ -71,7 +71,8 @@ struct Statistics {
   std::uint64_t tree_bytes = 0;       ///< the finished tree
   std::uint64_t workspace_bytes = 0;  ///< most that was held besides, freed when build returns
 
-  /// Wall time of the build, allocation and measure_quality included: more than stage_ms adds up to.
+  /// Wall time of the build, allocation and measure_quality included: more than the sum of the
+  /// stages.
   double total_ms = 0.0;
   std::array<double, static_cast<std::size_t>(Stage::count)> stage_ms{};
   std::array<SkipReport, static_cast<std::size_t>(Skip::count)> skips{};

@@ -15,8 +15,8 @@
 
 namespace zkd::core {
 
-/// Cuts the cell of a leaf out of the scene box: on each of its six sides the first plane met on
-/// the way up.
+/// Cuts the cell of a leaf out of the scene box: each of its six sides is the first plane met on
+/// the way up that bounds that side, since planes met later lie farther out.
 ZKD_HOST_DEVICE inline Box leaf_cell(const Node* nodes, const Parent* parents_of_nodes,
                                      Parent parent, const Box& bounds) {
   Box cell = bounds;
@@ -38,7 +38,7 @@ ZKD_HOST_DEVICE inline Box leaf_cell(const Node* nodes, const Parent* parents_of
 }
 
 /// What `climb` does at a leaf and at each node it is the last to reach. Both write the box they
-/// made into the parent and return it.
+/// made into the parent, and return the way up to it.
 struct TightBoxes {
   const Box* boxes;  ///< of triangles, in the caller's units
   const std::uint32_t* leaf_offsets;

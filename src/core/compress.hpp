@@ -35,7 +35,7 @@ struct LinkWriter {
   ZKD_HOST_DEVICE void load() { trunks = *trunk_count; }
 
   /// Links `child`, which covers trunks left..right, to the node above it: the essential node where
-  /// it parts from the trunk before it, or the one where it parts from the trunk after it, whichever
+  /// it parts from the trunk before it, or that where it parts from the trunk after it, whichever
   /// has the longer prefix and so lies lower.
   ZKD_HOST_DEVICE void link(Link child, std::uint32_t left, std::uint32_t right,
                             const std::uint8_t* levels) const {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// The exception, and the names of its codes.
 #include <zkd/error.hpp>
 
 namespace zkd {

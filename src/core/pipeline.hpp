@@ -3,8 +3,9 @@
 // The Morton builder, start to end, over the verbs of a backend: Li, Wang, Deng, Fully Parallel
 // Kd-Tree Construction for Real-Time Ray Tracing, I3D 2014. Each step is one file of this folder.
 //
-// Every step is a fixed number of passes over all elements; none goes level by level, and nothing
-// here recurses. The verbs are described in core/verbs.hpp.
+// MortonPipeline::run is the table of contents. Every step is a fixed number of passes over all
+// elements; none goes level by level, and nothing here recurses. The verbs are described in
+// core/verbs.hpp.
 #pragma once
 
 #include <cstdint>
@@ -55,10 +56,10 @@ struct Workspace {
   SortBuffers<Code> sort;
   std::uint32_t* first;  ///< position of the first triangle of each trunk, and the end
   TrunkKey* trunk_keys;
-  std::uint8_t* levels;
+  std::uint8_t* levels;  ///< of essential nodes
   Parent* parents_of_nodes;
   Parent* parents_of_leaves;
-  std::uint32_t* arrivals;
+  std::uint32_t* arrivals;  ///< children that have arrived at each node, for climb
 
   void lay_out(Arena& arena, std::size_t triangles) {
     state = arena.take<BuildState>(1);
@@ -142,18 +143,18 @@ class MortonPipeline {
     backend_.take(work, triangle_count_);
     state_ = work.state;
 
-    validate(work);
+    validate(work);  // 1 validate.hpp, 2 lattice.hpp
     check(state_->report);
-    encode(work);
+    encode(work);  // 3 morton.hpp
     backend_.stage(Stage::sort);
-    work.sort = backend_.radix_sort(work.sort, valid(), code_bits_bound());
+    work.sort = backend_.radix_sort(work.sort, valid(), code_bits_bound());  // 4
 
-    const SortedKeys<Code> keys = recode(work);
-    find_trunks(work, keys);
-    link_nodes(work);
-    place_planes(work);
-    list_references(work);
-    close_boxes(work);
+    const SortedKeys<Code> keys = recode(work);  // 5 recode.hpp
+    find_trunks(work, keys);                     // 6 trunks.hpp
+    link_nodes(work);                            // 7 essential.hpp, 8 compress.hpp
+    place_planes(work);                          // 9 planes.hpp
+    list_references(work);                       // 10 references.hpp
+    close_boxes(work);                           // 11 boxes.hpp
   }
 
   [[nodiscard]] const BuildState& state() const { return *state_; }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Stage 5, crowded trunks: triangles that share one code, more than a leaf should hold, are coded
-// again on a lattice over their own centres. A second round of the same stages, on those alone.
+// Stage 5, crowded trunks: where more triangles share one code than a leaf should hold, they are
+// coded again on a lattice over their own centres. A second round of the same stages (box, lattice,
+// encoding, sort), for all crowded trunks at once and for their triangles alone.
 #pragma once
 
 #include <cstdint>
@@ -54,8 +55,8 @@ struct CrowdedTrunkLength {
   }
 };
 
-/// The triangles of crowded trunks, numbered without the others: number k is in trunk c from
-/// offsets[c] on.
+/// The triangles of crowded trunks, numbered without the others, trunk by trunk: those of trunk c
+/// from offsets[c] on.
 struct CrowdedTriangles {
   const std::uint32_t* first;    ///< position of each crowded trunk
   const std::uint32_t* offsets;  ///< number of its first triangle
@@ -152,7 +153,8 @@ struct PlaceRecoded {
   }
 };
 
-/// The number of its crowded trunk, for every position of the sorted order that has one.
+/// The number of its crowded trunk, for every position of the sorted order that has one: for those
+/// who call the stage by itself.
 struct NumberCrowd {
   CrowdedTriangles crowded;
   std::uint32_t* crowd;
@@ -217,7 +219,7 @@ class SecondRound {
 
   /// Leaves `work` empty where no trunk can be crowded.
   void run(Backend& backend) {
-    // load() reads counts through a pointer; one whose bound is exact is its own place.
+    // load() reads counts through a pointer: to the bound itself where that is exact.
     const std::uint32_t* count = triangles.actual != nullptr ? triangles.actual : &triangles.bound;
     backend.select(triangles, BeginsCrowdedTrunk<Code>{codes, count, leaf_size}, first_scratch,
                    trunk_count);

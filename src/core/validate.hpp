@@ -143,7 +143,7 @@ struct ValidateTriangle {
   }
 };
 
-/// Boxes that are already made: only their union.
+/// Boxes that are already made: only their union, for those who call a later stage by itself.
 struct IncludeBox {
   const Box* boxes;
   ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {

@@ -16,14 +16,18 @@
 //   segmented_reduce(segments, offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s])
 //   radix_sort(buffers, count, bits)   stable; says in which of the buffers the result is
 //   climb(leaves, arrivals, f)         f.begin(leaf), then f.rise(node) for each node whose second
-//                                      child has arrived
+//                                      child has arrived (counted in `arrivals`, zero before); both
+//                                      return the way up. f.prefetch(leaf) may be called before
 //   may_exist(count), size(count)      what the host knows; where only the device does: true, bound
 //   admit_references(needed, out)      whether a tree can hold that many
 //   take(layout, counts...)            arrays until the build ends
-//   allocate_tree, allocate_references the arrays of the tree
+//   allocate_tree, allocate_references the arrays of the tree, from then on at nodes(),
+//                                      leaf_offsets(), references()
 //
-// A functor with a member load() has it called once per thread before its first element: there it
-// reads numbers that earlier stages left in the backend's memory.
+// A functor is copied for every range of elements that one thread works on. If it has a member
+// load(), that is called first: there the copy reads numbers that earlier stages left in the
+// backend's memory. A copy may remember something from one element to the next, if the results do
+// not depend on it.
 #pragma once
 
 #include <cstdint>

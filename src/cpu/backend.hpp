@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The verbs of core/pipeline.hpp on OpenMP.
+// The verbs of core/verbs.hpp on OpenMP, and the arrays of one build.
 #pragma once
 
 #include <algorithm>
@@ -334,7 +334,7 @@ class Backend {
     }
   }
 
-  static constexpr int max_blocks = 4;
+  static constexpr int max_blocks = 4;  // a build takes three workspaces at most, a stage two
 
   FloatEnvironment environment_;  // for the serial steps between passes
   Threads threads_;

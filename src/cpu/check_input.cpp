@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// The texts of errors in input: each names the offender and what would be right.
 #include "cpu/check_input.hpp"
 
 #include <cmath>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// One walk over a finished tree that adds up the terms of its SAH cost.
 #include "cpu/quality.hpp"
 
 #include <algorithm>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// The owner of a finished tree: moving, copying, giving back its memory.
 #include <zkd/tree.hpp>
 
 #include <cstring>
