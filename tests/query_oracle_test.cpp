@@ -14,7 +14,11 @@
 #include <vector>
 
 #if defined(ZKD_TEST_EMBREE)
+#if ZKD_TEST_EMBREE == 4
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 #endif
 
 #include <zkd/zkd.hpp>
@@ -147,8 +151,6 @@ class Embree {
   Embree& operator=(const Embree&) = delete;
 
   [[nodiscard]] Hit closest(const Ray& ray) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     RTCRayHit query{};
     query.ray.org_x = ray.origin.x;
     query.ray.org_y = ray.origin.y;
@@ -160,7 +162,13 @@ class Embree {
     query.ray.tfar = ray.t_max;
     query.ray.mask = 0xFFFFFFFFu;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+#if ZKD_TEST_EMBREE == 4
+    rtcIntersect1(scene_, &query);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
     rtcIntersect1(scene_, &context, &query);
+#endif
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
     return {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID};
   }

@@ -25,6 +25,7 @@
 #include <zkd/lattice.hpp>
 #include <zkd/options.hpp>
 #include <zkd/tree.hpp>
+#include <zkd/trunk_key.hpp>
 
 namespace zkd::stages {
 
@@ -68,29 +69,6 @@ ZKD_API std::uint32_t radix_sort(const cpu::Executor& executor, std::span<std::u
                                  std::span<std::uint32_t> values, std::uint32_t bits = 32);
 ZKD_API std::uint32_t radix_sort(const cpu::Executor& executor, std::span<std::uint64_t> codes,
                                  std::span<std::uint32_t> values, std::uint32_t bits = 64);
-
-/// The key of a trunk or triangle: the Morton code, followed by the code of the second round.
-///
-///     bit 127 .. 64   code, aligned to the left: level 0 is bit 127
-///     bit  63 .. 32   second-round code, aligned to the left; 0 where the trunk is not crowded
-///     bit  31 ..  0   0
-///
-/// Keys compare as numbers. A level is the number of a bit counted from bit 127: levels 0 to 63
-/// split the lattice of the scene, levels 64 to 95 the lattice of one crowded trunk.
-struct TrunkKey {
-  std::uint64_t code = 0;
-  std::uint64_t fine = 0;
-
-  friend ZKD_HOST_DEVICE bool operator<(const TrunkKey& a, const TrunkKey& b) {
-    return a.code != b.code ? a.code < b.code : a.fine < b.fine;
-  }
-  friend ZKD_HOST_DEVICE bool operator==(const TrunkKey& a, const TrunkKey& b) {
-    return a.code == b.code && a.fine == b.fine;
-  }
-};
-
-/// Levels below this one split the scene's lattice, the others a crowded trunk's.
-inline constexpr std::uint32_t first_fine_level = 64;
 
 /// In no crowded trunk.
 inline constexpr std::uint32_t no_crowd = 0xFFFFFFFFu;

@@ -10,8 +10,8 @@
 
 #include "core/arithmetic.hpp"
 #include "core/compress.hpp"
-#include "core/lattice.hpp"
-#include "core/validate.hpp"
+#include "core/frame.hpp"
+#include "core/triangle.hpp"
 
 namespace zkd::core {
 

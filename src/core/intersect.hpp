@@ -17,7 +17,7 @@
 
 #include "core/arithmetic.hpp"
 #include "core/ray.hpp"
-#include "core/validate.hpp"
+#include "core/triangle.hpp"
 
 namespace zkd::core {
 

@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include <zkd/stages.hpp>
+#include <zkd/trunk_key.hpp>
 
 #include "core/arithmetic.hpp"
 

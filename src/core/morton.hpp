@@ -9,6 +9,7 @@
 #include <zkd/lattice.hpp>
 
 #include "core/arithmetic.hpp"
+#include "core/triangle.hpp"
 
 namespace zkd::core {
 
@@ -55,11 +56,6 @@ struct BitDealer {
     return x;
   }
 };
-
-/// Centre of a box along one axis: exact in double but for floats 2^29 times apart.
-ZKD_HOST_DEVICE inline double centre(const Box& box, int a) {
-  return (static_cast<double>(box.lo[a]) + static_cast<double>(box.hi[a])) * 0.5;
-}
 
 /// A lattice made ready for many codes.
 struct MortonCoder {

@@ -20,6 +20,7 @@
 #include "core/boxes.hpp"
 #include "core/compress.hpp"
 #include "core/essential.hpp"
+#include "core/frame.hpp"
 #include "core/key.hpp"
 #include "core/lattice.hpp"
 #include "core/morton.hpp"
@@ -54,7 +55,7 @@ struct Workspace {
   BuildState* state;
   Box* boxes;
   SortBuffers<Code> sort;
-  std::uint32_t* first;  ///< position of the first triangle of each trunk, and the end
+  std::uint32_t* trunk_first;  ///< position of the first triangle of each trunk, and the end
   TrunkKey* trunk_keys;
   std::uint8_t* levels;  ///< of essential nodes
   Parent* parents_of_nodes;
@@ -66,22 +67,12 @@ struct Workspace {
     boxes = arena.take<Box>(triangles);
     sort = {arena.take<Code>(triangles), arena.take<std::uint32_t>(triangles),
             arena.take<Code>(triangles), arena.take<std::uint32_t>(triangles)};
-    first = arena.take<std::uint32_t>(triangles + 1);
+    trunk_first = arena.take<std::uint32_t>(triangles + 1);
     trunk_keys = arena.take<TrunkKey>(triangles);
     levels = arena.take<std::uint8_t>(triangles);
     parents_of_nodes = arena.take<Parent>(triangles);
     parents_of_leaves = arena.take<Parent>(triangles);
     arrivals = arena.take<std::uint32_t>(triangles);
-  }
-};
-
-/// For References::all.
-struct ReferenceWorkspace {
-  SortBuffers<std::uint32_t> sort;  ///< keys: leaves; values: triangles
-
-  void lay_out(Arena& arena, std::size_t references) {
-    sort = {arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references),
-            arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references)};
   }
 };
 
@@ -111,20 +102,6 @@ struct CountNodes {
   }
 };
 
-struct ReferenceOnce {
-  BuildState* state;
-  ZKD_HOST_DEVICE void operator()(std::uint32_t) const { state->references = state->report.valid; }
-};
-
-/// Puts the end behind the offsets of all leaves.
-struct CloseOffsets {
-  BuildState* state;
-  std::uint32_t* leaf_offsets;
-  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    leaf_offsets[state->trunks] = state->references;
-  }
-};
-
 /// One build. `Code` only has to hold the bits of the lattice: it does not change the tree.
 template <class Code, class Backend>
 class MortonPipeline {
@@ -145,16 +122,15 @@ class MortonPipeline {
 
     validate(work);  // 1 validate.hpp, 2 lattice.hpp
     check(state_->report);
-    encode(work);  // 3 morton.hpp
-    backend_.stage(Stage::sort);
-    work.sort = backend_.radix_sort(work.sort, valid(), code_bits_bound());  // 4
-
+    encode(work);                                // 3 morton.hpp
+    sort(work);                                  // 4 a verb of the backend
     const SortedKeys<Code> keys = recode(work);  // 5 recode.hpp
     find_trunks(work, keys);                     // 6 trunks.hpp
-    link_nodes(work);                            // 7 essential.hpp, 8 compress.hpp
-    place_planes(work);                          // 9 planes.hpp
+    find_essential_nodes(work);                  // 7 essential.hpp
+    compress_paths(work);                        // 8 compress.hpp
+    split_planes(work);                          // 9 planes.hpp
     list_references(work);                       // 10 references.hpp
-    close_boxes(work);                           // 11 boxes.hpp
+    tight_boxes(work);                           // 11 boxes.hpp
   }
 
   [[nodiscard]] const BuildState& state() const { return *state_; }
@@ -190,6 +166,11 @@ class MortonPipeline {
                       EncodeTriangle<Code>{work.boxes, ids, &state_->coder, work.sort.keys});
   }
 
+  void sort(Workspace<Code>& work) {
+    backend_.stage(Stage::sort);
+    work.sort = backend_.radix_sort(work.sort, valid(), code_bits_bound());
+  }
+
   SortedKeys<Code> recode(Workspace<Code>& work) {
     backend_.stage(Stage::recode);
     SortedKeys<Code> keys{work.sort.keys, nullptr, &state_->lattice.code_bits};
@@ -204,7 +185,7 @@ class MortonPipeline {
                                      &state_->crowded_trunks,
                                      &state_->crowded_triangles,
                                      work.sort.other_values,  // free again after the sort
-                                     work.first};             // not yet in use
+                                     work.trunk_first};       // not yet in use
     round.run(backend_);
     recoded_ = round.work;
     keys.fine = recoded_.fine;
@@ -216,16 +197,19 @@ class MortonPipeline {
     using Keys = std::conditional_t<sizeof(Code) == 4, PackedKeys, SortedKeys<Code>>;
     backend_.select(valid(),
                     BeginsTrunk<Keys>{Keys{keys}, &state_->report.valid, options_.leaf_size},
-                    work.first, &state_->trunks);
+                    work.trunk_first, &state_->trunks);
     backend_.for_each(one, CountNodes{state_});
-    backend_.for_each(trunks(), TrunkKeyOf<SortedKeys<Code>>{keys, work.first, work.trunk_keys});
+    backend_.for_each(trunks(),
+                      TrunkKeyOf<SortedKeys<Code>>{keys, work.trunk_first, work.trunk_keys});
     backend_.allocate_tree(trunks());
   }
 
-  void link_nodes(Workspace<Code>& work) {
+  void find_essential_nodes(Workspace<Code>& work) {
     backend_.stage(Stage::essential_nodes);
     backend_.for_each(nodes(), EssentialLevel{work.trunk_keys, work.levels});
+  }
 
+  void compress_paths(Workspace<Code>& work) {
     backend_.stage(Stage::path_compression);
     const LinkWriter writer{backend_.nodes()->child, sizeof(Node) / sizeof(Link),
                             work.parents_of_nodes,   work.parents_of_leaves,
@@ -234,10 +218,10 @@ class MortonPipeline {
     backend_.for_each(nodes(), LinkEssentialNode{work.trunk_keys, work.levels, writer});
   }
 
-  void place_planes(Workspace<Code>& work) {
+  void split_planes(Workspace<Code>& work) {
     backend_.stage(Stage::split_planes);
     Node* nodes = backend_.nodes();
-    const CrowdByPosition crowd{work.first, recoded_.first, &state_->crowded_trunks,
+    const CrowdByPosition crowd{work.trunk_first, recoded_.first, &state_->crowded_trunks,
                                 recoded_.lattices, recoded_.coders};
     backend_.for_each(this->nodes(),
                       PlaceSplitPlane<CrowdByPosition>{
@@ -253,48 +237,38 @@ class MortonPipeline {
   void list_references(Workspace<Code>& work) {
     backend_.stage(Stage::references);
     if (options_.references == References::once) {
-      backend_.for_each(one, ReferenceOnce{state_});
+      backend_.for_each(one, ReferenceEachOnce{&state_->report.valid, &state_->references});
       backend_.allocate_references(valid());
       backend_.for_each(valid(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
-      backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.first, backend_.leaf_offsets()});
-      backend_.for_each(one, CloseOffsets{state_, backend_.leaf_offsets()});
-      return;
+      backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.trunk_first, backend_.leaf_offsets()});
+    } else {
+      const CellWalk walk{triangles_,
+                          work.sort.values,
+                          reinterpret_cast<std::uint32_t*>(work.sort.other_keys),
+                          work.boxes,
+                          backend_.nodes(),
+                          work.levels,
+                          work.parents_of_nodes,
+                          work.parents_of_leaves,
+                          &state_->coder,
+                          &state_->frame};
+      static_assert(sizeof(TrunkKey) == remembered * sizeof(std::uint32_t));
+      ReferenceAll<Backend>{walk,
+                            work.trunk_first,
+                            valid(),
+                            trunks(),
+                            reinterpret_cast<std::uint32_t*>(work.sort.other_keys),
+                            work.sort.other_values,
+                            reinterpret_cast<std::uint32_t*>(work.trunk_keys),
+                            &state_->references_needed,
+                            &state_->references}
+          .run(backend_);
     }
-    auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);  // free again
-    backend_.for_each(trunks(),
-                      LabelTrunk{work.first, &state_->trunks, &state_->report.valid, trunk_of});
-    const CellWalk walk{triangles_,
-                        work.sort.values,
-                        trunk_of,
-                        work.boxes,
-                        backend_.nodes(),
-                        work.levels,
-                        work.parents_of_nodes,
-                        work.parents_of_leaves,
-                        &state_->coder,
-                        &state_->frame};
-    std::uint32_t* offsets = work.sort.other_values;  // free again
-    static_assert(sizeof(TrunkKey) == remembered * sizeof(std::uint32_t));
-    auto* notes = reinterpret_cast<std::uint32_t*>(work.trunk_keys);  // no longer needed
-    backend_.exclusive_scan(valid(), CountReferences{walk, notes}, offsets,
-                            &state_->references_needed);
-    const Count references =
-        backend_.admit_references(&state_->references_needed, &state_->references);
-    ReferenceWorkspace pairs{};
-    backend_.take(pairs, backend_.size(references));
-    backend_.for_each(
-        valid(), WriteReferences{walk, notes, offsets, &state_->report.valid, &state_->references,
-                                 pairs.sort.keys, pairs.sort.values});
-    pairs.sort =
-        backend_.radix_sort(pairs.sort, references, bits_to_count(backend_.size(trunks())));
-    backend_.allocate_references(references);
-    backend_.for_each(references, CopyTo<std::uint32_t>{pairs.sort.values, backend_.references()});
-    backend_.for_each(trunks(),
-                      LeafOffset{pairs.sort.keys, &state_->references, backend_.leaf_offsets()});
-    backend_.for_each(one, CloseOffsets{state_, backend_.leaf_offsets()});
+    backend_.for_each(one,
+                      CloseOffsets{&state_->trunks, &state_->references, backend_.leaf_offsets()});
   }
 
-  void close_boxes(Workspace<Code>& work) {
+  void tight_boxes(Workspace<Code>& work) {
     backend_.stage(Stage::tight_boxes);
     backend_.for_each(nodes(), Fill{work.arrivals, 0});
     backend_.climb(trunks(), work.arrivals,

@@ -11,6 +11,7 @@
 #include <zkd/lattice.hpp>
 
 #include "core/arena.hpp"
+#include "core/frame.hpp"
 #include "core/key.hpp"
 #include "core/lattice.hpp"
 #include "core/morton.hpp"
@@ -186,11 +187,6 @@ struct RecodeWorkspace {
     fine = arena.take<std::uint32_t>(triangles);
   }
 };
-
-/// Bits needed to write the numbers below `count`.
-inline std::uint32_t bits_to_count(std::uint32_t count) {
-  return count > 1 ? 64 - leading_zeros(count - 1) : 1;
-}
 
 /// The most crowded trunks that `triangles` can make.
 inline std::uint32_t most_crowded_trunks(std::uint32_t triangles, std::uint32_t leaf_size) {

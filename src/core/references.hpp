@@ -8,13 +8,15 @@
 
 #include <zkd/tree.hpp>
 
+#include "core/arena.hpp"
 #include "core/arithmetic.hpp"
 #include "core/compress.hpp"
+#include "core/frame.hpp"
 #include "core/key.hpp"
-#include "core/lattice.hpp"
 #include "core/morton.hpp"
 #include "core/search.hpp"
-#include "core/validate.hpp"
+#include "core/triangle.hpp"
+#include "core/verbs.hpp"
 
 namespace zkd::core {
 
@@ -267,6 +269,63 @@ struct LeafOffset {
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) const {
     offsets[leaf] = first_not_below(leaves, *reference_count, leaf);
+  }
+};
+
+/// Puts the end behind the offsets of all leaves.
+struct CloseOffsets {
+  const std::uint32_t* leaf_count;
+  const std::uint32_t* reference_count;
+  std::uint32_t* leaf_offsets;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
+    leaf_offsets[*leaf_count] = *reference_count;
+  }
+};
+
+/// `once`: as many references as valid triangles.
+struct ReferenceEachOnce {
+  const std::uint32_t* triangle_count;
+  std::uint32_t* reference_count;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const { *reference_count = *triangle_count; }
+};
+
+/// For References::all.
+struct ReferenceWorkspace {
+  SortBuffers<std::uint32_t> sort;  ///< keys: leaves; values: triangles
+
+  void lay_out(Arena& arena, std::size_t references) {
+    sort = {arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references),
+            arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references)};
+  }
+};
+
+/// `all`, start to end: count, write (leaf, triangle) pairs, sort them by leaf.
+template <class Backend>
+struct ReferenceAll {
+  CellWalk walk;
+  const std::uint32_t* trunk_first;
+  Count triangles;
+  Count trunks;
+  std::uint32_t* trunk_of;  ///< room for one number per triangle; what `walk` reads
+  std::uint32_t* offsets;   ///< likewise
+  std::uint32_t* notes;     ///< room for `remembered` numbers per triangle
+  std::uint64_t* needed;    ///< out: references, even if they are too many
+  std::uint32_t* count;     ///< out: references
+
+  void run(Backend& backend) {
+    backend.for_each(trunks, LabelTrunk{trunk_first, trunks.actual, triangles.actual, trunk_of});
+    backend.exclusive_scan(triangles, CountReferences{walk, notes}, offsets, needed);
+    const Count references = backend.admit_references(needed, count);
+    ReferenceWorkspace pairs{};
+    backend.take(pairs, backend.size(references));
+    backend.for_each(triangles, WriteReferences{walk, notes, offsets, triangles.actual, count,
+                                                pairs.sort.keys, pairs.sort.values});
+    pairs.sort = backend.radix_sort(pairs.sort, references, bits_to_count(backend.size(trunks)));
+    backend.allocate_references(references);
+    backend.for_each(references, CopyTo<std::uint32_t>{pairs.sort.values, backend.references()});
+    backend.for_each(trunks, LeafOffset{pairs.sort.keys, count, backend.leaf_offsets()});
   }
 };
 

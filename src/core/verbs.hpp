@@ -34,6 +34,8 @@
 
 #include <zkd/config.hpp>
 
+#include "core/arithmetic.hpp"
+
 namespace zkd::core {
 
 /// How many elements a pass works on.
@@ -53,6 +55,11 @@ struct SortBuffers {
   Key* other_keys;
   std::uint32_t* other_values;
 };
+
+/// Bits needed to write the numbers below `count`.
+inline std::uint32_t bits_to_count(std::uint32_t count) {
+  return count > 1 ? 64 - leading_zeros(count - 1) : 1;
+}
 
 template <class T>
 struct CopyTo {

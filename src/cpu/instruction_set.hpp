@@ -7,6 +7,10 @@
 // linker cannot mix them up.
 #pragma once
 
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <cpuid.h>
+#endif
+
 #include <zkd/cpu/executor.hpp>
 
 namespace zkd::cpu {
@@ -19,11 +23,20 @@ inline constexpr bool has_avx2_code = true;
 inline constexpr bool has_avx2_code = false;
 #endif
 
-/// Whether this processor runs the AVX2 code.
+/// Whether this processor runs the AVX2 code: every extension that it is compiled for.
 inline bool processor_has_avx2() noexcept {
 #if defined(__x86_64__) && defined(__GNUC__)
-  static const bool has = __builtin_cpu_supports("avx2") != 0 &&
-                          __builtin_cpu_supports("fma") != 0 && __builtin_cpu_supports("bmi2") != 0;
+  static const bool has = [] {
+    // Not all compilers know the names of these two here; the bits are asked for themselves.
+    unsigned a = 0;
+    unsigned b = 0;
+    unsigned c = 0;
+    unsigned d = 0;
+    const bool bmi = __get_cpuid_count(7, 0, &a, &b, &c, &d) != 0 && (b & bit_BMI) != 0;
+    const bool lzcnt = __get_cpuid(0x80000001, &a, &b, &c, &d) != 0 && (c & bit_ABM) != 0;
+    return bmi && lzcnt && __builtin_cpu_supports("avx2") != 0 &&
+           __builtin_cpu_supports("fma") != 0 && __builtin_cpu_supports("bmi2") != 0;
+  }();
   return has;
 #else
   return false;
