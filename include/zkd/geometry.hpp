@@ -25,6 +25,9 @@ inline constexpr std::uint32_t no_triangle = 0xFFFFFFFFu;
 /// The most triangles one tree takes, and the most references it holds: 2^31 - 1.
 inline constexpr std::uint64_t max_count = 0x7FFFFFFFu;
 
+/// The most triangles without indices: 32 bits count their positions.
+inline constexpr std::uint64_t max_soup_count = 0xFFFFFFFFu / 3;
+
 /// A non-owning view of triangles: positions in any unit, and three indices a triangle or none.
 ///
 /// The arrays must outlive every build and query that is given the view, and must not change
@@ -50,8 +53,9 @@ struct TriangleView {
     if (faces.empty()) indices = nullptr;
   }
 
-  /// A soup: every three positions are a triangle. A remainder of one or two is an error that
-  /// `build` reports (ErrorCode::invalid_view).
+  /// A soup: every three positions are a triangle, at most max_soup_count of them. A remainder of
+  /// one or two is an error that `build` reports (ErrorCode::invalid_view); fewer than three
+  /// positions are an empty view.
   explicit TriangleView(std::span<const glm::vec3> corners)
       : positions(reinterpret_cast<const float*>(corners.data())),
         position_count(corners.size()),
@@ -98,7 +102,7 @@ struct Box {
 ///
 /// The direction may have any length; t is in units of that length. A ray with a NaN anywhere, an
 /// infinite origin or direction, a zero direction, or t_min > t_max is a miss, at once. t_max (and
-/// t_min) may be infinite.
+/// t_min) may be infinite; a hit whose t is too large for a float is none.
 struct Ray {
   glm::vec3 origin{0.0F};
   float t_min = 0.0F;

@@ -53,7 +53,8 @@ struct Statistics {
   std::uint64_t skipped_zero_area = 0;   ///< exactly zero area: never hit, not in the tree
   std::uint64_t skipped_non_finite = 0;  ///< only with InvalidTriangles::skip
   std::uint32_t code_bits = 0;           ///< as used
-  std::uint64_t crowded_trunks = 0;      ///< codes shared by more than leaf_size triangles
+  std::uint64_t crowded_trunks = 0;      ///< codes shared by more than leaf_size triangles; 0
+                                         ///< without BuildOptions::recode_crowded
   std::uint64_t crowded_triangles = 0;   ///< triangles in them
   std::uint64_t nodes = 0;               ///< inner nodes
   std::uint64_t leaves = 0;

@@ -32,8 +32,8 @@ struct Candidate {
   [[nodiscard]] ZKD_HOST_DEVICE bool found() const { return triangle != no_triangle; }
 };
 
-/// The ray meets the plane of a triangle inside it: where, in tree space.
-struct PlanePoint {
+/// Where a ray's line meets a triangle: t in tree space, and u, v as in Hit.
+struct Crossing {
   Real t;
   Real u;
   Real v;
@@ -41,7 +41,7 @@ struct PlanePoint {
 
 /// In double: for the few rays that pass an edge within the rounding of single precision.
 ZKD_HOST_DEVICE inline bool intersect_wide(const PreparedRay& ray, const Corners& corners,
-                                           PlanePoint& point) {
+                                           Crossing& crossing) {
   Wide x[3];
   Wide y[3];
   Wide depth[3];
@@ -58,19 +58,20 @@ ZKD_HOST_DEVICE inline bool intersect_wide(const PreparedRay& ray, const Corners
   const Wide determinant = a + b + c;
   if (!(determinant < zero) && !(determinant > zero)) return false;
   const Wide t = (a * depth[0] + b * depth[1] + c * depth[2]) * ray.wide_shear[2] / determinant;
-  point = {static_cast<float>(t.value), static_cast<float>((b / determinant).value),
-           static_cast<float>((c / determinant).value)};
+  crossing = {static_cast<float>(t.value), static_cast<float>((b / determinant).value),
+              static_cast<float>((c / determinant).value)};
   return true;
 }
 
 /// Whether the ray's line passes inside the triangle, and where it meets its plane.
 ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners& corners,
-                                           PlanePoint& point) {
+                                           Crossing& crossing) {
   Real x[3];
   Real y[3];
   Real depth[3];
   float size_x = 0.0F;
   float size_y = 0.0F;
+  float size_z = 0.0F;
   float across_x = 0.0F;
   float across_y = 0.0F;
   for (int i = 0; i < 3; ++i) {
@@ -82,6 +83,7 @@ ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners
     depth[i] = along;
     size_x = larger(size_x, magnitude(right.value) + magnitude(along.value));
     size_y = larger(size_y, magnitude(up.value) + magnitude(along.value));
+    size_z = larger(size_z, magnitude(along.value));
     across_x = larger(across_x, magnitude(x[i].value));
     across_y = larger(across_y, magnitude(y[i].value));
   }
@@ -91,7 +93,7 @@ ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners
 
   // Subtraction, the slope and the shear round a sheared coordinate four times, each by 2^-24 of
   // its size at most; 6 leaves room for the products and for the bound's own rounding. Below 2^-96
-  // edge functions lose digits to underflow.
+  // edge functions, and what they weigh in t, lose digits to underflow.
   constexpr float unit = 1.0F / 16777216.0F;
   constexpr float smallest = 1.2621774e-29F;
   const float error_x = 6.0F * unit * size_x;
@@ -101,11 +103,13 @@ ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners
   const float least = smaller(a.value, smaller(b.value, c.value));
   const float most = larger(a.value, larger(b.value, c.value));
   if (least < -bound && most > bound) return false;
-  if (!(least > bound || most < -bound)) return intersect_wide(ray, corners, point);
+  const bool decided = least > bound || most < -bound;
+  if (!decided || !(larger(-least, most) * size_z > smallest))
+    return intersect_wide(ray, corners, crossing);
 
   const Real determinant = a + b + c;
-  point = {fma(a, depth[0], fma(b, depth[1], c * depth[2])) * ray.shear[2] / determinant,
-           b / determinant, c / determinant};
+  crossing = {fma(a, depth[0], fma(b, depth[1], c * depth[2])) * ray.shear[2] / determinant,
+              b / determinant, c / determinant};
   return true;
 }
 
@@ -113,15 +117,15 @@ ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners
 /// Returns whether it did.
 ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& corners,
                                       std::uint32_t id, Candidate& best) {
-  PlanePoint point;
-  if (!intersect_line(ray, corners, point)) return false;
+  Crossing crossing;
+  if (!intersect_line(ray, corners, crossing)) return false;
   // Written so that NaN, from coordinates that are not finite, is never accepted.
-  if (!(point.t <= best.t)) return false;
-  if (point.t == best.t && !(id < best.triangle)) return false;
-  const float callers_t = ray.callers_t(point.t);
+  if (!(crossing.t <= best.t)) return false;
+  if (crossing.t == best.t && !(id < best.triangle)) return false;
+  const float callers_t = ray.callers_t(crossing.t);
   if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
   const Real zero = 0.0F;  // adding it turns -0 into +0
-  best = {point.t, callers_t, (point.u + zero).value, (point.v + zero).value, id};
+  best = {crossing.t, callers_t, (crossing.u + zero).value, (crossing.v + zero).value, id};
   return true;
 }
 

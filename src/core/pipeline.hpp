@@ -242,24 +242,29 @@ class MortonPipeline {
       backend_.for_each(valid(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
       backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.trunk_first, backend_.leaf_offsets()});
     } else {
+      // Memory that earlier stages are done with.
+      auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);
+      static_assert(sizeof(SplitNode) == sizeof(TrunkKey));
+      auto* split_nodes = reinterpret_cast<SplitNode*>(work.trunk_keys);
       const CellWalk walk{triangles_,
                           work.sort.values,
-                          reinterpret_cast<std::uint32_t*>(work.sort.other_keys),
+                          trunk_of,
                           work.boxes,
-                          backend_.nodes(),
+                          split_nodes,
                           work.levels,
                           work.parents_of_nodes,
                           work.parents_of_leaves,
                           &state_->coder,
                           &state_->frame};
-      static_assert(sizeof(TrunkKey) == remembered * sizeof(std::uint32_t));
       ReferenceAll<Backend>{walk,
                             work.trunk_first,
                             valid(),
                             trunks(),
-                            reinterpret_cast<std::uint32_t*>(work.sort.other_keys),
+                            nodes(),
+                            backend_.nodes(),
+                            split_nodes,
+                            trunk_of,
                             work.sort.other_values,
-                            reinterpret_cast<std::uint32_t*>(work.trunk_keys),
                             &state_->references_needed,
                             &state_->references}
           .run(backend_);

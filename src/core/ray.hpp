@@ -14,10 +14,11 @@
 namespace zkd::core {
 
 /// Half-width of every plane and box in traversal, in units of 2^-24 of the largest distance along
-/// an axis between the ray's origin and the scene box. It covers the rounding of the box test and
-/// the distance by which the intersector's rounding may move a hit: 8 was enough in every
-/// measurement, a first-order sum of errors gives 12, and 16 leaves room above that.
-inline constexpr float slab_units = 16.0F;
+/// an axis between the ray's origin and the scene box. It covers the rounding of the box test (4)
+/// and the distance by which the intersector's rounding may move a hit: to first order 9 units
+/// along the ray's main axis and up to 16 across it, where t counts 8 of them. 8 in all was enough
+/// in every measurement.
+inline constexpr float slab_units = 24.0F;
 
 /// An origin further from the scene box than this many times the largest coordinate is moved along
 /// the ray, in double, to the point nearest to the scene's centre.
@@ -84,15 +85,19 @@ struct PreparedRay {
       return;
 
     float reach = 0.0F;
+    float furthest = 0.0F;
     for (int a = 0; a < 3; ++a) {
       origin[a] = static_cast<float>(from[a].value);
+      furthest = larger(furthest, magnitude(origin[a].value));
       const float lo = static_cast<float>(low[a].value);
       const float hi = static_cast<float>(high[a].value);
       reach = larger(reach, larger(magnitude((Real(lo) - origin[a]).value),
                                    magnitude((Real(hi) - origin[a]).value)));
     }
     constexpr float unit = 1.0F / 16777216.0F;
-    const Real half_width = Real(slab_units * unit) * Real(reach);
+    // Boxes are tested from a moved origin that was rounded to float, the intersector's is not.
+    const Real rounding = moved ? Real(2.0F * unit) * Real(furthest) : Real(0.0F);
+    const Real half_width = Real(slab_units * unit) * Real(reach) + rounding;
 
     Real d[3];
     for (int a = 0; a < 3; ++a) {

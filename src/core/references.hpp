@@ -115,6 +115,23 @@ struct LabelTrunk {
   }
 };
 
+/// What a walk needs of a node: a quarter of it, so that more of them stay in cache.
+struct SplitNode {
+  float plane;
+  std::uint32_t axis;
+  Link child[2];
+};
+
+struct CopySplitNode {
+  const Node* nodes;
+  SplitNode* split_nodes;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t index) const {
+    const Node& node = nodes[index];
+    split_nodes[index] = {node.plane, node.axis, {node.child[0], node.child[1]}};
+  }
+};
+
 /// Walks the cells of a tree whose planes and links are finished, and calls visit(leaf) for every
 /// leaf cell that the i-th sorted triangle touches, in the order of the leaves.
 ///
@@ -126,7 +143,7 @@ struct CellWalk {
   const std::uint32_t* ids;
   const std::uint32_t* trunk_of;
   const Box* boxes;
-  const Node* nodes;
+  const SplitNode* nodes;
   const std::uint8_t* levels;
   const Parent* parents_of_nodes;
   const Parent* parents_of_leaves;
@@ -162,7 +179,7 @@ struct CellWalk {
     for (;;) {
       bool dead_end = false;
       while (!link.is_leaf() && !dead_end) {
-        const Node& node = nodes[link.index()];
+        const SplitNode& node = nodes[link.index()];
         const bool below = placed.box.lo[node.axis] <= node.plane;
         const bool above = placed.box.hi[node.axis] >= node.plane;
         if (!(below && above)) {
@@ -209,7 +226,7 @@ struct CellWalk {
 };
 
 /// Leaves of a triangle that are remembered while counting, so that most triangles need one walk.
-inline constexpr std::uint32_t remembered = 4;
+inline constexpr std::uint32_t remembered = 8;
 
 /// How many leaves list the i-th sorted triangle; notes the first of them.
 struct CountReferences {
@@ -301,6 +318,15 @@ struct ReferenceWorkspace {
   }
 };
 
+/// Leaves noted while counting: `remembered` for each triangle.
+struct NotesWorkspace {
+  std::uint32_t* notes;
+
+  void lay_out(Arena& arena, std::size_t triangles) {
+    notes = arena.take<std::uint32_t>(triangles * remembered);
+  }
+};
+
 /// `all`, start to end: count, write (leaf, triangle) pairs, sort them by leaf.
 template <class Backend>
 struct ReferenceAll {
@@ -308,19 +334,24 @@ struct ReferenceAll {
   const std::uint32_t* trunk_first;
   Count triangles;
   Count trunks;
-  std::uint32_t* trunk_of;  ///< room for one number per triangle; what `walk` reads
+  Count node_count;
+  const Node* nodes;
+  SplitNode* split_nodes;   ///< room for one per node; what `walk` reads
+  std::uint32_t* trunk_of;  ///< room for one number per triangle; likewise
   std::uint32_t* offsets;   ///< likewise
-  std::uint32_t* notes;     ///< room for `remembered` numbers per triangle
   std::uint64_t* needed;    ///< out: references, even if they are too many
   std::uint32_t* count;     ///< out: references
 
   void run(Backend& backend) {
+    backend.for_each(node_count, CopySplitNode{nodes, split_nodes});
     backend.for_each(trunks, LabelTrunk{trunk_first, trunks.actual, triangles.actual, trunk_of});
-    backend.exclusive_scan(triangles, CountReferences{walk, notes}, offsets, needed);
+    NotesWorkspace noted{};
+    backend.take(noted, triangles.bound);
+    backend.exclusive_scan(triangles, CountReferences{walk, noted.notes}, offsets, needed);
     const Count references = backend.admit_references(needed, count);
     ReferenceWorkspace pairs{};
     backend.take(pairs, backend.size(references));
-    backend.for_each(triangles, WriteReferences{walk, notes, offsets, triangles.actual, count,
+    backend.for_each(triangles, WriteReferences{walk, noted.notes, offsets, triangles.actual, count,
                                                 pairs.sort.keys, pairs.sort.values});
     pairs.sort = backend.radix_sort(pairs.sort, references, bits_to_count(backend.size(trunks)));
     backend.allocate_references(references);

@@ -21,6 +21,7 @@
 #include <zkd/tree.hpp>
 
 #include "core/pipeline.hpp"
+#include "cpu/check_input.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/memory.hpp"
 #include "cpu/radix_sort.hpp"
@@ -40,7 +41,9 @@ class Backend {
  public:
   explicit Backend(const Executor& executor)
       : threads_(executor),
-        memory_(executor.memory != nullptr ? executor.memory : std::pmr::get_default_resource()) {}
+        memory_(executor.memory != nullptr ? executor.memory : std::pmr::get_default_resource()) {
+    check_executor(executor);
+  }
 
   // --- passes ---
 
@@ -223,7 +226,6 @@ class Backend {
                                        const BuildOptions& options, bool wide_codes,
                                        std::uint64_t reference_count) {
     const auto triangles = static_cast<std::uint32_t>(triangle_count);
-    const std::uint32_t code_bits = wide_codes ? 64 : 32;
     MemoryRequirement most;
     most.workspace_bytes = wide_codes ? core::bytes_of(core::Workspace<std::uint64_t>{}, triangles)
                                       : core::bytes_of(core::Workspace<std::uint32_t>{}, triangles);
@@ -233,13 +235,11 @@ class Backend {
           core::bytes_of(core::RecodeWorkspace{}, triangles, crowded, crowded > 0 ? triangles : 0);
     }
     if (options.references == References::all)
-      most.workspace_bytes += core::bytes_of(core::ReferenceWorkspace{}, reference_count);
-    // The largest of what single verbs take for themselves.
-    const int team = Threads(executor).available();
-    most.workspace_bytes +=
-        std::max(core::bytes_of(SortScratch{}, team, digits_of(std::max(code_bits, 64u))),
-                 core::bytes_of(typename Scratch<core::ValidationReport>::Layout{},
-                                static_cast<std::size_t>(team)));
+      most.workspace_bytes += core::bytes_of(core::NotesWorkspace{}, triangles) +
+                              core::bytes_of(core::ReferenceWorkspace{}, reference_count);
+    // Of what single verbs take for themselves, a sort by 64 bits takes most.
+    const int team = Threads(executor).team(std::max<std::uint64_t>(triangles, reference_count));
+    most.workspace_bytes += core::bytes_of(SortScratch{}, team, digits_of(64));
     most.tree_bytes =
         core::bytes_of(TreeArrays{}, triangles) + reference_count * sizeof(std::uint32_t);
     return most;
@@ -290,7 +290,6 @@ class Backend {
   [[nodiscard]] std::uint32_t passes_left_out() const { return passes_left_out_; }
   [[nodiscard]] std::size_t workspace_bytes() const { return most_held_; }
   [[nodiscard]] std::pmr::memory_resource* memory() const { return memory_; }
-  [[nodiscard]] const Threads& threads() const { return threads_; }
   Block& tree_block() { return tree_block_; }
   Block& reference_block() { return reference_block_; }
 

@@ -54,9 +54,10 @@ void report_skips(const core::BuildState& state, const BuildOptions& options,
     statistics.skips[static_cast<std::size_t>(what)] = {amount != 0, amount};
   };
   std::uint32_t flat = 0;
-  for (const std::uint32_t bits : state.lattice.bits) flat += bits == 0 ? 1 : 0;
+  for (int a = 0; a < 3; ++a)
+    flat += state.report.bounds.lo[a] == state.report.bounds.hi[a] ? 1 : 0;
   report(Skip::radix_passes, passes_left_out);
-  report(Skip::flat_axes, state.report.valid != 0 ? flat : 0);
+  report(Skip::flat_axes, flat);
   report(Skip::wide_codes,
          options.code_bits == 0 && state.report.valid < core::wide_code_threshold ? 32 : 0);
   report(Skip::recoding, options.recode_crowded && state.crowded_trunks == 0 ? 1 : 0);
@@ -100,9 +101,7 @@ Tree build(const cpu::Executor& executor, const TriangleView& triangles,
   const auto start = std::chrono::steady_clock::now();
   cpu::check_options(options);
   cpu::check_view(triangles);
-  if (executor.threads < 0)
-    throw Error(ErrorCode::invalid_option, static_cast<std::uint64_t>(executor.threads),
-                "threads is " + std::to_string(executor.threads) + "; it must not be negative");
+  cpu::check_executor(executor);
   cpu::Backend backend(executor);
   Tree tree = needs_wide_codes(options, triangles.triangle_count)
                   ? build_with<std::uint64_t>(backend, triangles, options)
@@ -122,6 +121,7 @@ Tree build(const TriangleView& triangles, const BuildOptions& options) {
 
 MemoryRequirement memory_requirement(const cpu::Executor& executor, std::uint64_t triangle_count,
                                      const BuildOptions& options, std::uint64_t reference_count) {
+  cpu::check_executor(executor);
   cpu::check_options(options);
   cpu::check_count(triangle_count);
   return cpu::Backend::requirement(

@@ -28,6 +28,13 @@ void check_enumerator(Enum value, Enum last, const char* option) {
 
 }  // namespace
 
+void check_executor(const Executor& executor) {
+  if (executor.threads < 0)
+    fail(ErrorCode::invalid_option, static_cast<std::uint64_t>(executor.threads),
+         "threads is " + std::to_string(executor.threads) + "; it must not be negative");
+  check_enumerator(executor.instructions, InstructionSet::avx2, "instructions");
+}
+
 void check_count(std::uint64_t triangle_count) {
   if (triangle_count > max_count)
     fail(ErrorCode::too_many_triangles, triangle_count,
@@ -49,8 +56,12 @@ void check_view(const TriangleView& triangles) {
   if (triangles.positions == nullptr && triangles.position_count != 0)
     fail(ErrorCode::invalid_view, triangles.position_count,
          "positions is null, but position_count is " + std::to_string(triangles.position_count));
-  if (triangles.indices == nullptr && triangles.triangle_count * 3 != triangles.position_count &&
-      !(triangles.triangle_count == 0 && triangles.position_count >= 3))
+  if (triangles.triangle_count == 0 || triangles.indices != nullptr) return;
+  if (triangles.triangle_count > max_soup_count)
+    fail(ErrorCode::too_many_triangles, triangles.triangle_count,
+         std::to_string(triangles.triangle_count) + " triangles without indices; there may be " +
+             std::to_string(max_soup_count) + ", whose positions 32 bits count");
+  if (triangles.triangle_count * 3 != triangles.position_count)
     fail(ErrorCode::invalid_view, triangles.position_count,
          "a soup of " + std::to_string(triangles.triangle_count) + " triangles needs " +
              std::to_string(triangles.triangle_count * 3) + " positions, not " +

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include <zkd/cpu/executor.hpp>
 #include <zkd/error.hpp>
 #include <zkd/geometry.hpp>
 #include <zkd/options.hpp>
@@ -12,6 +13,9 @@
 #include "core/validate.hpp"
 
 namespace zkd::cpu {
+
+/// Throws Error invalid_option.
+void check_executor(const Executor& executor);
 
 /// Throws Error invalid_view or too_many_triangles.
 void check_view(const TriangleView& triangles);

@@ -23,6 +23,30 @@ void check_length(std::size_t length, std::size_t expected, const char* what) {
                     std::to_string(expected));
 }
 
+/// The lowest index at which something is wrong.
+struct FirstOffender {
+  std::uint32_t index = core::none_found;
+  void combine(const FirstOffender& other) { index = std::min(index, other.index); }
+};
+
+template <class IsWrong>
+struct FindOffender {
+  IsWrong is_wrong;
+  void operator()(std::uint32_t i, FirstOffender& first) const {
+    if (is_wrong(i)) first.index = std::min(first.index, i);
+  }
+};
+
+/// Throws Error invalid_view, naming the first i for which is_wrong(i).
+template <class IsWrong>
+void check_each(cpu::Backend& backend, Count count, const char* what, IsWrong is_wrong) {
+  FirstOffender first;
+  backend.reduce(count, &first, FindOffender<IsWrong>{is_wrong});
+  if (first.index != core::none_found)
+    throw Error(ErrorCode::invalid_view, first.index,
+                std::string(what) + " is out of range at " + std::to_string(first.index));
+}
+
 Count exactly(std::size_t n) {
   cpu::check_count(n);
   return {nullptr, static_cast<std::uint32_t>(n)};
@@ -110,6 +134,10 @@ Lattice make_lattice(const Box& bounds, std::uint32_t code_bits, AxisOrder order
     throw Error(ErrorCode::invalid_option, code_bits,
                 "code_bits is " + std::to_string(code_bits) + "; it must be 1 to 64");
   const cpu::FloatEnvironment environment;
+  for (int a = 0; a < 3; ++a)
+    if (!bounds.empty() && !(core::is_finite(bounds.lo[a]) && core::is_finite(bounds.hi[a])))
+      throw Error(ErrorCode::invalid_view, static_cast<std::uint64_t>(a),
+                  "bounds are not finite along axis " + std::to_string(a));
   return core::make_lattice(core::widen(bounds), code_bits, order, core::SceneFrame(bounds).finest);
 }
 
@@ -157,6 +185,7 @@ std::uint32_t recode_crowded(const cpu::Executor& executor, std::span<const Box>
   backend.take(room, codes.size());
   std::uint32_t trunks = 0;
   std::uint32_t crowded = 0;
+  check_each(backend, count, "ids", [=](std::uint32_t i) { return ids[i] >= boxes.size(); });
   core::ValidationReport scene;
   backend.reduce(exactly(boxes.size()), &scene, core::IncludeBox{boxes.data()});
   const core::SceneFrame frame(scene.bounds);
@@ -217,6 +246,9 @@ void split_planes(const cpu::Executor& executor, std::span<const TrunkKey> trunk
   check_length(axes.size(), levels.size(), "axes");
   check_length(planes.size(), levels.size(), "planes");
   cpu::Backend backend(executor);
+  check_each(backend, exactly(levels.size()), "crowd", [=](std::uint32_t node) {
+    return levels[node] >= first_fine_level && crowd[node + 1] >= lattices.size();
+  });
   const core::MortonCoder coder(lattice);
   const double unscaled = 1.0;
   backend.for_each(exactly(levels.size()),
