@@ -11,9 +11,10 @@
 // - A ray that lies in a triangle's plane, up to rounding, does not hit it.
 // - A degenerate ray (see Ray) misses at once.
 // - The intersector is watertight (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT
-//   2013): single precision with an error bound, and double precision where the bound does not
-//   decide. The signs of its edge functions are those of one set of sheared corners, exactly, so
-//   triangles that share an edge never both miss a ray through it.
+//   2013): single precision, with an error bound, rejects; double precision decides what is left
+//   and gives t, u and v, rounded to float once. The signs of its edge functions are those of one
+//   set of sheared corners, exactly, so triangles that share an edge never both miss a ray through
+//   it.
 // - The tree never changes an answer: closest_hit equals a loop over all triangles with the same
 //   intersector, bit for bit.
 // - Answers do not depend on the caller's compiler flags or floating-point mode (rounding,

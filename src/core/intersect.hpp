@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Ray against triangle, watertight: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT
-// 2013, as a filter. Single precision decides where its rounding cannot change the outcome, double
-// precision the rest.
+// 2013, in two precisions. Single precision rejects most triangles; what it cannot reject for
+// certain is decided, and its t, u and v computed, in double.
 //
 // Corners are sheared along the ray; the signs of the edge functions of the sheared corners say
-// whether the ray passes inside. Where all are larger than an error bound, they are the signs that
-// the corners sheared in double have; else those are computed, by Kahan's difference of products,
-// whose sign is exact. So all signs belong to one set of points, and two triangles that share an
-// edge never both miss a ray through it.
+// whether the ray passes inside. Where two of them differ in sign by more than an error bound, the
+// corners sheared in double differ as well; else those are looked at, by Kahan's difference of
+// products, whose sign is exact. So all signs belong to one set of points, and two triangles that
+// share an edge never both miss a ray through it.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,9 @@ namespace zkd::core {
 
 /// A hit in tree space. Nearer is a smaller t; of equal ones, the lower id.
 struct Candidate {
-  Real t = 3.4028234663852886e38F;
+  Wide t = 3.4028234663852886e38;  ///< no hit in tree space is further
+  Real limit =
+      3.4028234663852886e38F;  ///< not less than t: a box that begins behind it is of no use
   float callers_t = 0.0F;
   float u = 0.0F;
   float v = 0.0F;
@@ -32,16 +34,53 @@ struct Candidate {
   [[nodiscard]] ZKD_HOST_DEVICE bool found() const { return triangle != no_triangle; }
 };
 
+/// Whether the ray's line passes outside the triangle for certain, by single precision.
+ZKD_HOST_DEVICE inline bool surely_misses(const PreparedRay& ray, const Corners& corners) {
+  Real x[3];
+  Real y[3];
+  float size_x = 0.0F;
+  float size_y = 0.0F;
+  float across_x = 0.0F;
+  float across_y = 0.0F;
+  for (int i = 0; i < 3; ++i) {
+    const Real along = ray.from_origin(corners.p[i], 2);
+    const Real right = ray.from_origin(corners.p[i], 0);
+    const Real up = ray.from_origin(corners.p[i], 1);
+    x[i] = fma(-ray.shear[0], along, right);
+    y[i] = fma(-ray.shear[1], along, up);
+    size_x = larger(size_x, magnitude(right.value) + magnitude(along.value));
+    size_y = larger(size_y, magnitude(up.value) + magnitude(along.value));
+    across_x = larger(across_x, magnitude(x[i].value));
+    across_y = larger(across_y, magnitude(y[i].value));
+  }
+  const Real a = difference_of_products(x[2], y[1], y[2], x[1]);
+  const Real b = difference_of_products(x[0], y[2], y[0], x[2]);
+  const Real c = difference_of_products(x[1], y[0], y[1], x[0]);
+
+  // Subtraction, the slope and the shear round a sheared coordinate by 3 * 2^-24 of its size at
+  // most (5 for a moved origin); 6 leaves room for the products and for the bound's own rounding.
+  // Below 2^-96 edge functions lose digits to underflow.
+  constexpr float unit = 1.0F / 16777216.0F;
+  constexpr float smallest = 1.2621774e-29F;
+  const float error_x = 6.0F * unit * size_x;
+  const float error_y = 6.0F * unit * size_y;
+  const float bound =
+      larger(2.0F * (error_x * (across_y + error_y) + error_y * across_x), smallest);
+  const float least = smaller(a.value, smaller(b.value, c.value));
+  const float most = larger(a.value, larger(b.value, c.value));
+  return least < -bound && most > bound;
+}
+
 /// Where a ray's line meets a triangle: t in tree space, and u, v as in Hit.
 struct Crossing {
-  Real t;
-  Real u;
-  Real v;
+  Wide t;
+  Wide u;
+  Wide v;
 };
 
-/// In double: for the few rays that pass an edge within the rounding of single precision.
-ZKD_HOST_DEVICE inline bool intersect_wide(const PreparedRay& ray, const Corners& corners,
-                                           Crossing& crossing) {
+/// Whether the ray's line passes inside the triangle, and where.
+ZKD_HOST_DEVICE inline bool crosses(const PreparedRay& ray, const Corners& corners,
+                                    Crossing& crossing) {
   Wide x[3];
   Wide y[3];
   Wide depth[3];
@@ -57,58 +96,7 @@ ZKD_HOST_DEVICE inline bool intersect_wide(const PreparedRay& ray, const Corners
   if ((a < zero || b < zero || c < zero) && (a > zero || b > zero || c > zero)) return false;
   const Wide determinant = a + b + c;
   if (!(determinant < zero) && !(determinant > zero)) return false;
-  const Wide t = (a * depth[0] + b * depth[1] + c * depth[2]) * ray.wide_shear[2] / determinant;
-  crossing = {static_cast<float>(t.value), static_cast<float>((b / determinant).value),
-              static_cast<float>((c / determinant).value)};
-  return true;
-}
-
-/// Whether the ray's line passes inside the triangle, and where it meets its plane.
-ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners& corners,
-                                           Crossing& crossing) {
-  Real x[3];
-  Real y[3];
-  Real depth[3];
-  float size_x = 0.0F;
-  float size_y = 0.0F;
-  float size_z = 0.0F;
-  float across_x = 0.0F;
-  float across_y = 0.0F;
-  for (int i = 0; i < 3; ++i) {
-    const Real along = ray.from_origin(corners.p[i], 2);
-    const Real right = ray.from_origin(corners.p[i], 0);
-    const Real up = ray.from_origin(corners.p[i], 1);
-    x[i] = fma(-ray.shear[0], along, right);
-    y[i] = fma(-ray.shear[1], along, up);
-    depth[i] = along;
-    size_x = larger(size_x, magnitude(right.value) + magnitude(along.value));
-    size_y = larger(size_y, magnitude(up.value) + magnitude(along.value));
-    size_z = larger(size_z, magnitude(along.value));
-    across_x = larger(across_x, magnitude(x[i].value));
-    across_y = larger(across_y, magnitude(y[i].value));
-  }
-  const Real a = difference_of_products(x[2], y[1], y[2], x[1]);
-  const Real b = difference_of_products(x[0], y[2], y[0], x[2]);
-  const Real c = difference_of_products(x[1], y[0], y[1], x[0]);
-
-  // Subtraction, the slope and the shear round a sheared coordinate four times, each by 2^-24 of
-  // its size at most; 6 leaves room for the products and for the bound's own rounding. Below 2^-96
-  // edge functions, and what they weigh in t, lose digits to underflow.
-  constexpr float unit = 1.0F / 16777216.0F;
-  constexpr float smallest = 1.2621774e-29F;
-  const float error_x = 6.0F * unit * size_x;
-  const float error_y = 6.0F * unit * size_y;
-  const float bound =
-      larger(2.0F * (error_x * (across_y + error_y) + error_y * across_x), smallest);
-  const float least = smaller(a.value, smaller(b.value, c.value));
-  const float most = larger(a.value, larger(b.value, c.value));
-  if (least < -bound && most > bound) return false;
-  const bool decided = least > bound || most < -bound;
-  if (!decided || !(larger(-least, most) * size_z > smallest))
-    return intersect_wide(ray, corners, crossing);
-
-  const Real determinant = a + b + c;
-  crossing = {fma(a, depth[0], fma(b, depth[1], c * depth[2])) * ray.shear[2] / determinant,
+  crossing = {(a * depth[0] + b * depth[1] + c * depth[2]) * ray.wide_shear[2] / determinant,
               b / determinant, c / determinant};
   return true;
 }
@@ -117,15 +105,21 @@ ZKD_HOST_DEVICE inline bool intersect_line(const PreparedRay& ray, const Corners
 /// Returns whether it did.
 ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& corners,
                                       std::uint32_t id, Candidate& best) {
+  if (surely_misses(ray, corners)) return false;
   Crossing crossing;
-  if (!intersect_line(ray, corners, crossing)) return false;
+  if (!crosses(ray, corners, crossing)) return false;
   // Written so that NaN, from coordinates that are not finite, is never accepted.
   if (!(crossing.t <= best.t)) return false;
   if (crossing.t == best.t && !(id < best.triangle)) return false;
   const float callers_t = ray.callers_t(crossing.t);
   if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
-  const Real zero = 0.0F;  // adding it turns -0 into +0
-  best = {crossing.t, callers_t, (crossing.u + zero).value, (crossing.v + zero).value, id};
+
+  constexpr float slack = 1.0F / 4194304.0F;  // 2^-22, more than rounding t to float takes
+  const float t = static_cast<float>(crossing.t.value);
+  const float limit = t + slack * magnitude(t) + 1.0e-37F;
+  const float u = static_cast<float>(crossing.u.value);
+  const float v = static_cast<float>(crossing.v.value);
+  best = {crossing.t, limit, callers_t, u + 0.0F, v + 0.0F, id};  // adding +0 turns -0 into +0
   return true;
 }
 

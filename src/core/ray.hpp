@@ -13,12 +13,11 @@
 
 namespace zkd::core {
 
-/// Half-width of every plane and box in traversal, in units of 2^-24 of the largest distance along
-/// an axis between the ray's origin and the scene box. It covers the rounding of the box test (4)
-/// and the distance by which the intersector's rounding may move a hit: to first order 9 units
-/// along the ray's main axis and up to 16 across it, where t counts 8 of them. 8 in all was enough
-/// in every measurement.
-inline constexpr float slab_units = 24.0F;
+/// Half-width of every box in traversal, in units of 2^-24 of the largest distance along an axis
+/// between the ray's origin and the scene box. The box test rounds a difference, an inverse, a
+/// product and a sum, each by 1 unit at most, since no box reaches further than the scene; hits are
+/// computed in double. 8 is twice the sum.
+inline constexpr float slab_units = 8.0F;
 
 /// An origin further from the scene box than this many times the largest coordinate is moved along
 /// the ray, in double, to the point nearest to the scene's centre.
@@ -144,8 +143,8 @@ struct PreparedRay {
   }
 
   /// The caller's t of a hit at `t` in tree space.
-  [[nodiscard]] ZKD_HOST_DEVICE float callers_t(Real t) const {
-    return static_cast<float>(((Wide(static_cast<double>(t.value)) + t_shift) * t_scale).value);
+  [[nodiscard]] ZKD_HOST_DEVICE float callers_t(Wide t) const {
+    return static_cast<float>(((t + t_shift) * t_scale).value);
   }
 
  private:

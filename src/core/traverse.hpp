@@ -73,7 +73,7 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
     while (!link.is_leaf()) {
       ++node_visits;
       const Node& node = tree.nodes[link.index()];
-      const Real last = smaller(ray.last, best.t);
+      const Real last = smaller(ray.last, best.limit);
       const Entries entries = boxes(node, last);
       if (entries.hit == 3) {
         const bool upper_first = entries.t[1] < entries.t[0] ||
@@ -107,7 +107,7 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
         return best;
       }
       link = Link{stack[--waiting].link};
-    } while (stack[waiting].t > best.t.value);
+    } while (stack[waiting].t > best.limit.value);
   }
 }
 
