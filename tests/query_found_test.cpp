@@ -3,8 +3,10 @@
 // Bugs that were found once, each as a named test.
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <vector>
 
+#include <zkd/stages.hpp>
 #include <zkd/zkd.hpp>
 
 #include "scene/random.hpp"
@@ -105,6 +107,54 @@ TEST(QueryFound, SoupWithMorePositionsThanIndicesCount) {
     EXPECT_EQ(error.code(), ErrorCode::too_many_triangles);
     EXPECT_EQ(error.offender(), max_soup_count + 1);
   }
+}
+
+// Single stages check the indices that they follow.
+TEST(StageFound, IndicesOutOfRangeAreErrors) {
+  const std::vector<Box> boxes(2);
+  const std::vector<std::uint64_t> codes(2);
+  std::vector<std::uint32_t> ids = {0, 7};
+  std::vector<stages::TrunkKey> keys(2);
+  std::vector<std::uint32_t> crowd(2);
+  const auto code_of = [](const auto& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return ErrorCode::out_of_memory;  // none of these
+  };
+  EXPECT_EQ(code_of([&] {
+              (void)stages::recode_crowded({}, boxes, {}, codes, ids, 4, AxisOrder::by_extent, true,
+                                           keys, crowd, {});
+            }),
+            ErrorCode::invalid_view);
+
+  const std::vector<std::uint8_t> levels = {stages::first_fine_level};
+  std::vector<std::uint32_t> axes(1);
+  std::vector<float> planes(1);
+  crowd = {0, 3};
+  EXPECT_EQ(code_of([&] {
+              stages::split_planes({}, keys, levels, crowd, {}, std::vector<Lattice>(1), axes,
+                                   planes);
+            }),
+            ErrorCode::invalid_view);
+
+  const std::vector<std::uint32_t> first = {0, 1};
+  const std::vector<Link> children = {Link::leaf(0), Link::leaf(9)};
+  ids = {0, 1};
+  const stages::Skeleton skeleton{ids, first, levels, children, Link::node(0), axes, planes};
+  const std::vector<std::uint32_t> offsets = {0, 1, 2};
+  std::vector<Node> nodes(1);
+  EXPECT_EQ(code_of([&] {
+              stages::tight_boxes({}, boxes, skeleton, References::once, offsets, ids, nodes);
+            }),
+            ErrorCode::invalid_view);
+
+  Box infinite;
+  infinite.lo[0] = infinite.lo[1] = infinite.lo[2] = 0.0F;
+  infinite.hi[0] = infinite.hi[1] = infinite.hi[2] = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(code_of([&] { (void)stages::make_lattice(infinite, 32); }), ErrorCode::invalid_view);
 }
 
 }  // namespace

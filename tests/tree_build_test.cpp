@@ -8,6 +8,7 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,9 @@ struct Composition {
   std::vector<std::uint32_t> axes;
   std::vector<float> planes;
   std::uint32_t crowded = 0;
+  std::vector<std::uint32_t> leaf_offsets;
+  std::vector<std::uint32_t> references;
+  std::vector<Node> nodes;
 };
 
 Composition compose(const TriangleView& triangles, const BuildOptions& options) {
@@ -72,6 +76,7 @@ Composition compose(const TriangleView& triangles, const BuildOptions& options) 
     trunk_crowd.push_back(crowd[at]);
   }
   out.first.push_back(scene.valid);
+  out.leaf_offsets.assign(1, 0);
   if (trunk_keys.empty()) return out;
 
   const std::size_t nodes = trunk_keys.size() - 1;
@@ -83,6 +88,21 @@ Composition compose(const TriangleView& triangles, const BuildOptions& options) 
   out.planes.resize(nodes);
   stages::split_planes(executor, trunk_keys, levels, trunk_crowd, out.lattice, lattices, out.axes,
                        out.planes);
+
+  const stages::Skeleton skeleton{
+      out.ids,   std::span(out.first).first(nodes + 1), levels, out.children, out.root, out.axes,
+      out.planes};
+  out.leaf_offsets.resize(nodes + 2);
+  const std::uint64_t references =
+      stages::list_references(executor, triangles, out.boxes, skeleton, out.lattice,
+                              options.references, out.leaf_offsets, {});
+  out.references.resize(references);
+  EXPECT_EQ(stages::list_references(executor, triangles, out.boxes, skeleton, out.lattice,
+                                    options.references, out.leaf_offsets, out.references),
+            references);
+  out.nodes.resize(nodes);
+  stages::tight_boxes(executor, out.boxes, skeleton, options.references, out.leaf_offsets,
+                      out.references, out.nodes);
   return out;
 }
 
@@ -93,12 +113,18 @@ void expect_equals_composition(const TriangleView& triangles, const BuildOptions
   ASSERT_EQ(view.leaf_count, want.first.size() - 1);
   EXPECT_TRUE(view.root == want.root);
   EXPECT_EQ(tree.statistics().crowded_trunks, want.crowded);
-  for (std::uint32_t leaf = 0; leaf < view.leaf_count; ++leaf) {
-    ASSERT_EQ(view.leaf_offsets[leaf], want.first[leaf]);
+  for (std::uint32_t leaf = 0; leaf <= view.leaf_count; ++leaf) {
+    ASSERT_EQ(view.leaf_offsets[leaf], want.leaf_offsets[leaf]) << "leaf " << leaf;
+    if (options.references == References::once) {
+      ASSERT_EQ(view.leaf_offsets[leaf], want.first[leaf]) << "leaf " << leaf;
+    }
   }
-  ASSERT_EQ(view.reference_count, want.ids.size());
+  ASSERT_EQ(view.reference_count, want.references.size());
   for (std::uint32_t i = 0; i < view.reference_count; ++i) {
-    ASSERT_EQ(view.references[i], want.ids[i]) << "reference " << i;
+    ASSERT_EQ(view.references[i], want.references[i]) << "reference " << i;
+  }
+  for (std::uint32_t j = 0; j < view.node_count(); ++j) {
+    ASSERT_EQ(std::memcmp(&view.nodes[j], &want.nodes[j], sizeof(Node)), 0) << "node " << j;
   }
   for (std::uint32_t j = 0; j < view.node_count(); ++j) {
     const Node& node = view.nodes[j];
@@ -130,11 +156,14 @@ TEST(TreeBuild, GivesTheBytesOfTheStages) {
             SCOPED_TRACE(m.name + ", " + std::to_string(code_bits) + " bits, leaf size " +
                          std::to_string(leaf_size) + ", " + to_string(order) +
                          (recode ? "" : ", not coded again"));
-            expect_equals_composition(m.mesh.view(), {.leaf_size = leaf_size,
-                                                      .code_bits = code_bits,
-                                                      .axis_order = order,
-                                                      .recode_crowded = recode,
-                                                      .invalid_triangles = InvalidTriangles::skip});
+            for (const References references : {References::once, References::all})
+              expect_equals_composition(m.mesh.view(),
+                                        {.references = references,
+                                         .leaf_size = leaf_size,
+                                         .code_bits = code_bits,
+                                         .axis_order = order,
+                                         .recode_crowded = recode,
+                                         .invalid_triangles = InvalidTriangles::skip});
             if (testing::Test::HasFailure()) return;
           }
         }
@@ -145,6 +174,7 @@ TEST(TreeBuild, GivesTheBytesOfTheStages) {
 
 TEST(TreeBuild, GivesTheBytesOfTheStagesOnLargerScenes) {
   expect_equals_composition(scene::soup(50000, 2).view(), {});
+  expect_equals_composition(scene::soup(50000, 2).view(), {.references = References::all});
   expect_equals_composition(scene::small_in_large(20000, 1e4F, 2).view(), {});
   expect_equals_composition(scene::sphere(6).view(), {.code_bits = 64});
 }

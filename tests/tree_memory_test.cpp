@@ -104,7 +104,7 @@ TEST(TreeMemory, OperatorNewIsCounted) {
   }
   const std::size_t before = news;
   ::operator delete(::operator new(1));
-  ::operator delete(::operator new(64, std::align_val_t{64}), std::align_val_t{64});
+  ::operator delete (::operator new (64, std::align_val_t{64}), std::align_val_t{64});
   EXPECT_EQ(news - before, 2u);
 }
 

@@ -118,4 +118,39 @@ ZKD_API void split_planes(const cpu::Executor& executor, std::span<const TrunkKe
                           std::span<const Lattice> lattices, std::span<std::uint32_t> axes,
                           std::span<float> planes);
 
+/// What stages 5 to 9 made, for the last two: non-owning, all from one run.
+struct Skeleton {
+  std::span<const std::uint32_t> ids;    ///< triangles in the order of their keys
+  std::span<const std::uint32_t> first;  ///< stage 6, as many as there are trunks
+  std::span<const std::uint8_t> levels;  ///< stage 7
+  std::span<const Link> children;        ///< stage 8
+  Link root;                             ///< stage 8
+  std::span<const std::uint32_t> axes;   ///< stage 9
+  std::span<const float> planes;         ///< stage 9
+};
+
+/// Stage 10, references: which triangles each leaf (trunk) lists, by `policy`, once or all. Leaf t
+/// lists references [leaf_offsets[t], leaf_offsets[t + 1]); `leaf_offsets` is one longer than there
+/// are trunks. Returns how many references there are; as many are written as fit into `references`,
+/// so a call with an empty span asks for the number. `boxes` are stage 1's, `lattice` stage 2's.
+///
+/// Throws Error too_many_references, unsupported_option; and invalid_view where an index in the
+/// skeleton is out of range. O(triangles) for once, O((triangles + references) * depth) for all.
+ZKD_API std::uint64_t list_references(const cpu::Executor& executor, const TriangleView& triangles,
+                                      std::span<const Box> boxes, const Skeleton& skeleton,
+                                      const Lattice& lattice, References policy,
+                                      std::span<std::uint32_t> leaf_offsets,
+                                      std::span<std::uint32_t> references);
+
+/// Stage 11, tight boxes: writes the finished nodes, with links, planes in tree space, and the
+/// boxes of what is inside each child. `policy` is the one that the references were listed by: with
+/// `all` a leaf's box is cut to its cell. O(references + trunks), for all O(references + trunks *
+/// depth).
+///
+/// Throws Error unsupported_option; and invalid_view where an index is out of range.
+ZKD_API void tight_boxes(const cpu::Executor& executor, std::span<const Box> boxes,
+                         const Skeleton& skeleton, References policy,
+                         std::span<const std::uint32_t> leaf_offsets,
+                         std::span<const std::uint32_t> references, std::span<Node> nodes);
+
 }  // namespace zkd::stages
