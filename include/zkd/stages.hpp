@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Stages 1 to 9 of the Morton builder, one public function each, in the order of the poster: from
-// triangles to linked nodes with planes. (References and tight boxes, 10 and 11, need a tree to
-// write to: build().) build() gives the bytes of their composition. They are there to time one, to
-// put another in its place, and to test each by itself.
+// The stages of the Morton builder, one public function each, in the order of the poster. build()
+// gives the bytes of their composition. They are there to time one, to put another in its place, and
+// to test each by itself.
 //
 // Every function dispatches on the executor it is given, works on spans the caller owns (host
 // memory for cpu::Executor), runs on all threads of the executor, and blocks until done. Scratch
