@@ -13,6 +13,7 @@
 #include <zkd/stages.hpp>
 #include <zkd/zkd.hpp>
 
+#include "cpu/backend.hpp"
 #include "support/memory.hpp"
 
 namespace zkd {
@@ -337,6 +338,24 @@ TEST(ApiError, StagesCheckTheirArguments) {
   for (const std::uint32_t leaf_size : {0u, 1025u}) {
     EXPECT_ERROR(caught([&] { (void)stages::find_trunks({}, keys, leaf_size, first); }),
                  ErrorCode::invalid_option, leaf_size);
+  }
+}
+
+// More than 2^31 - 1 references would take tens of GB: what decides is asked directly.
+TEST(ApiError, TooManyReferences) {
+  cpu::Backend backend(cpu::Executor{});
+  std::uint32_t count = 0;
+  const std::uint64_t most = max_count;
+  EXPECT_EQ(cpu::Backend::size(backend.admit_references(&most, &count)), max_count);
+  EXPECT_EQ(count, max_count);
+  const std::uint64_t needed = (std::uint64_t{1} << 32) + 5;  // 5 in 32 bits
+  try {
+    (void)backend.admit_references(&needed, &count);
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::too_many_references);
+    EXPECT_EQ(error.offender(), needed);
+    EXPECT_NE(std::string(error.what()).find(std::to_string(needed)), std::string::npos);
   }
 }
 
