@@ -14,6 +14,8 @@
 #include <zkd/options.hpp>
 #include <zkd/statistics.hpp>
 
+#include "verify/check.hpp"
+
 namespace zkd::bench {
 
 /// The three kinds of rays of the workload (rays.hpp).
@@ -55,13 +57,7 @@ struct AllocatedBytes {
 };
 
 /// Answers that differ from the exact oracle.
-struct Differences {
-  std::uint64_t missed = 0;
-  std::uint64_t phantom = 0;
-  std::uint64_t wrong_triangle = 0;
-
-  [[nodiscard]] std::uint64_t total() const { return missed + phantom + wrong_triangle; }
-};
+using Differences = verify::Mistakes;
 
 /// Rays of one kind, or of all, against the exact oracle.
 struct Check {

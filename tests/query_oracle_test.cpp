@@ -55,17 +55,6 @@ std::vector<Ray> rays_for(const test::NamedMesh& m, const Tree& tree, std::uint3
   return rays;
 }
 
-void add(verify::Summary& total, const verify::Summary& one) {
-  total.rays += one.rays;
-  total.correct += one.correct;
-  total.missed += one.missed;
-  total.phantom += one.phantom;
-  total.wrong_triangle += one.wrong_triangle;
-  total.in_band.missed += one.in_band.missed;
-  total.in_band.phantom += one.in_band.phantom;
-  total.in_band.wrong_triangle += one.in_band.wrong_triangle;
-}
-
 void report(const std::string& name, const verify::Summary& total) {
   std::printf("%-24s rays %8llu, in the band: missed %llu, phantom %llu, wrong triangle %llu\n",
               name.c_str(), static_cast<unsigned long long>(total.rays),
@@ -109,7 +98,7 @@ TEST_P(QueryOracle, NothingOutsideTheBand) {
       const std::vector<Ray> rays = rays_for(m, tree, 600, seed);
       const std::vector<Hit> hits = test::closest(tree.view(), m.mesh.view(), rays);
       const verify::Summary one = verify::check(oracle, m.mesh.view(), rays, hits, 2);
-      add(total, one);
+      total.add_counts(one);
       expect_none_outside_band(one, oracle, m, rays, hits);
       if (testing::Test::HasFailure()) return;
     }
@@ -279,7 +268,7 @@ TEST(QueryOracleBunny, NothingOutsideTheBand) {
     rays.insert(rays.end(), hard.begin(), hard.end());
     const std::vector<Hit> hits = test::closest(tree.view(), m.mesh.view(), rays);
     const verify::Summary one = verify::check(oracle, m.mesh.view(), rays, hits, 2);
-    add(total, one);
+    total.add_counts(one);
     expect_none_outside_band(one, oracle, m, rays, hits);
 #if defined(ZKD_TEST_EMBREE)
     if (references == References::once) {

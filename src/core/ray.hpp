@@ -28,11 +28,11 @@ struct PreparedRay {
   Real origin[3];
   Real inverse[3];          ///< of the direction; large instead of infinite
   Real padding[3];          ///< half-width of a plane, in units of t
-  Real shear[3];            ///< direction[kx] / direction[kz], [ky] / [kz], 1 / [kz]
+  Real shear[2];            ///< direction[kx] / direction[kz], [ky] / [kz]
   Real permuted_origin[3];  ///< origin in the order kx, ky, kz
   Real permuted_rest[3];    ///< what rounding a moved origin to float took off it
   Wide wide_origin[3];      ///< the same in double, and not rounded
-  Wide wide_shear[3];
+  Wide wide_shear[3];       ///< shear likewise, and 1 / direction[kz]
   bool moved = false;
   std::uint32_t k[3];
   std::uint32_t negative[3];  ///< 1: the direction is negative along this axis
@@ -63,7 +63,7 @@ struct PreparedRay {
     const int direction_exponent = exponent_of(static_cast<double>(longest));
     const Wide direction_scale = power_of_two(-direction_exponent);
     const Wide wide_scale = static_cast<double>(tree.scale);
-    t_scale = Wide(power_of_two(-direction_exponent)) / wide_scale;
+    t_scale = direction_scale / wide_scale;
     const Wide to_tree = Wide(power_of_two(direction_exponent)) * wide_scale;
 
     Wide from[3];
@@ -118,7 +118,7 @@ struct PreparedRay {
     wide_shear[0] = direction[k[0]] / direction[k[2]];
     wide_shear[1] = direction[k[1]] / direction[k[2]];
     wide_shear[2] = Wide(1.0) / direction[k[2]];
-    for (int i = 0; i < 3; ++i) shear[i] = static_cast<float>(wide_shear[i].value);
+    for (int i = 0; i < 2; ++i) shear[i] = static_cast<float>(wide_shear[i].value);
     for (int i = 0; i < 3; ++i) {
       permuted_origin[i] = origin[k[i]];
       wide_origin[i] = from[k[i]];

@@ -20,7 +20,7 @@
 
 namespace zkd::cpu {
 
-/// Large blocks fresh from the system cost a page fault for every 4 KB, a tenth of a build. With
+/// Large blocks fresh from the system cost a page fault for every 4 KB, a quarter of a build. With
 /// huge pages it is one for every 2 MB. Only a hint, and only on memory that is not the caller's.
 inline void ask_for_huge_pages([[maybe_unused]] void* data, [[maybe_unused]] std::size_t bytes) {
 #if defined(__linux__)

@@ -12,7 +12,6 @@
 
 #include "core/arena.hpp"
 #include "core/verbs.hpp"
-#include "cpu/memory.hpp"
 #include "cpu/threads.hpp"
 
 namespace zkd::cpu {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <string>
-#include <type_traits>
 
 #include "core/pipeline.hpp"
 #include "cpu/backend.hpp"

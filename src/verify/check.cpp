@@ -53,19 +53,24 @@ void count(Part& part, const Verdict& verdict, std::uint64_t ray, bool hit) {
 void add(Part& all, Part& part) {
   Summary& to = all.summary;
   const Summary& from = part.summary;
-  to.correct += from.correct;
-  to.missed += from.missed;
-  to.phantom += from.phantom;
-  to.wrong_triangle += from.wrong_triangle;
-  to.in_band.missed += from.in_band.missed;
-  to.in_band.phantom += from.in_band.phantom;
-  to.in_band.wrong_triangle += from.in_band.wrong_triangle;
+  to.add_counts(from);
   to.first_offenders.insert(to.first_offenders.end(), from.first_offenders.begin(),
                             from.first_offenders.end());
   all.t_ulps.insert(all.t_ulps.end(), part.t_ulps.begin(), part.t_ulps.end());
 }
 
 }  // namespace
+
+void Summary::add_counts(const Summary& other) {
+  rays += other.rays;
+  correct += other.correct;
+  missed += other.missed;
+  phantom += other.phantom;
+  wrong_triangle += other.wrong_triangle;
+  in_band.missed += other.in_band.missed;
+  in_band.phantom += other.in_band.phantom;
+  in_band.wrong_triangle += other.in_band.wrong_triangle;
+}
 
 Summary check(const Oracle& oracle, const TriangleView& triangles, std::span<const Ray> rays,
               std::span<const Hit> hits, int threads,

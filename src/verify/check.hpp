@@ -41,6 +41,9 @@ struct Summary {
   [[nodiscard]] std::uint64_t outside_band() const {
     return missed + phantom + wrong_triangle - in_band.total();
   }
+
+  /// Adds the counts of other rays, not their t_ulp figures nor their first_offenders.
+  void add_counts(const Summary& other);
 };
 
 /// Judges hits[i] as the answer to rays[i], on `threads` threads (0: all). `progress` is called now
