@@ -80,7 +80,7 @@ std::map<RayKind, Check> check_tree(const CheckedScene& scene, const Tree& tree,
                                     const cpu::Executor& executor) {
   const std::vector<Ray> primary = primary_sample(scene);
   const std::vector<Hit> primary_hits = trace(scene, tree, executor, primary);
-  const Box& box = tree.view().bounds;
+  const Box& box = tree.view().bounds();
   const std::vector<SurfacePoint> points =
       surface_points(scene.mesh.view(), box, primary, primary_hits);
 
@@ -149,7 +149,7 @@ std::uint64_t count_leaks(const CheckedScene& scene, const Tree& tree,
   std::vector<Ray> rays = primary_sample(scene);
   std::vector<Hit> hits = trace(scene, tree, executor, rays);
   const std::vector<SurfacePoint> points =
-      surface_points(scene.mesh.view(), tree.view().bounds, rays, hits, Side::back);
+      surface_points(scene.mesh.view(), tree.view().bounds(), rays, hits, Side::back);
   rays = diffuse_rays(points, scene.count, scene.seed);
   hits = trace(scene, tree, executor, rays);
   return judge(scene, executor, rays, hits, "leaks").missed;

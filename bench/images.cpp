@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <vector>
+
+#include <glm/geometric.hpp>
 
 #include <zkd/query.hpp>
 
@@ -38,8 +39,8 @@ Pixels shade(const TriangleView& triangles, const Tree& tree, const scene::Camer
   std::vector<Hit> hits(rays.size());
   closest_hit(executor, tree.view(), triangles, rays, hits);
   const std::vector<SurfacePoint> points =
-      surface_points(triangles, tree.view().bounds, rays, hits);
-  const Light light = place_light(camera, tree.view().bounds);
+      surface_points(triangles, tree.view().bounds(), rays, hits);
+  const Light light = place_light(camera, tree.view().bounds());
   std::vector<Ray> to_light(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     to_light[i].origin = points[i].origin;

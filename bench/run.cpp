@@ -3,8 +3,6 @@
 // One scene measured: what is timed, in which order, and what is found out besides.
 #include "run.hpp"
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -12,6 +10,8 @@
 #include <string>
 #include <thread>
 #include <utility>
+
+#include <sys/resource.h>
 
 #include <zkd/build.hpp>
 #include <zkd/query.hpp>
@@ -62,7 +62,7 @@ Workload make_workload(const Options& options, const scene::Camera& camera,
   std::vector<Ray> primary = tiled_primary_rays(camera, options.size).rays;
   std::vector<Hit> hits(primary.size());
   closest_hit(executor, tree.view(), triangles, primary, hits);
-  const Box& box = tree.view().bounds;
+  const Box& box = tree.view().bounds();
   const std::vector<SurfacePoint> points = surface_points(triangles, box, primary, hits);
   Workload workload;
   for (const RayKind kind : options.rays) {
@@ -168,7 +168,7 @@ AllocatedBytes measure_memory(const cpu::Executor& executor, const TriangleView&
   bytes.tree = memory.held();
   bytes.workspace = memory.peak() - memory.held();
   const std::uint64_t references =
-      options.references == References::once ? 0 : tree.view().reference_count;
+      options.references == References::once ? 0 : tree.view().reference_count();
   const MemoryRequirement asked =
       memory_requirement(counted, triangles.triangle_count, options, references);
   bytes.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;

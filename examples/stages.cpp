@@ -99,7 +99,7 @@ int main() try {
       zkd::build(cpu, triangles, {.leaf_size = leaf_size, .code_bits = code_bits});
   bool same = tree.nodes().size() == planes.size();
   for (std::size_t j = 0; same && j < planes.size(); ++j) {
-    same = tree.nodes()[j].plane == planes[j] * tree.view().scale &&
+    same = tree.nodes()[j].plane == planes[j] * tree.view().scale() &&
            tree.nodes()[j].axis == axes[j] && tree.nodes()[j].child[0] == children[2 * j];
   }
   std::printf("\nbuild() has %s planes\n", same ? "the same" : "other");

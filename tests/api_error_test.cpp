@@ -13,7 +13,7 @@
 #include <zkd/stages.hpp>
 #include <zkd/zkd.hpp>
 
-#include "cpu/backend.hpp"
+#include "core/status.hpp"
 #include "support/memory.hpp"
 
 namespace zkd {
@@ -298,6 +298,7 @@ TEST(ApiError, CodesHaveTheirNames) {
   EXPECT_STREQ(to_string(ErrorCode::non_finite_vertex), "non_finite_vertex");
   EXPECT_STREQ(to_string(ErrorCode::too_many_triangles), "too_many_triangles");
   EXPECT_STREQ(to_string(ErrorCode::too_many_references), "too_many_references");
+  EXPECT_STREQ(to_string(ErrorCode::reference_capacity), "reference_capacity");
   EXPECT_STREQ(to_string(ErrorCode::invalid_view), "invalid_view");
   EXPECT_STREQ(to_string(ErrorCode::invalid_option), "invalid_option");
   EXPECT_STREQ(to_string(ErrorCode::unsupported_option), "unsupported_option");
@@ -343,20 +344,29 @@ TEST(ApiError, StagesCheckTheirArguments) {
 
 // More than 2^31 - 1 references would take tens of GB: what decides is asked directly.
 TEST(ApiError, TooManyReferences) {
-  cpu::Backend backend(cpu::Executor{});
-  std::uint32_t count = 0;
-  const std::uint64_t most = max_count;
-  EXPECT_EQ(cpu::Backend::size(backend.admit_references(&most, &count)), max_count);
-  EXPECT_EQ(count, max_count);
+  core::BuildCounts counts;
+  counts.references_needed = max_count;
+  core::AdmitReferences{&counts, max_count}(0);
+  EXPECT_FALSE(counts.status.failed);
+  EXPECT_EQ(counts.references, max_count);
+
   const std::uint64_t needed = (std::uint64_t{1} << 32) + 5;  // 5 in 32 bits
-  try {
-    (void)backend.admit_references(&needed, &count);
-    FAIL() << "accepted";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::too_many_references);
-    EXPECT_EQ(error.offender(), needed);
-    EXPECT_NE(std::string(error.what()).find(std::to_string(needed)), std::string::npos);
-  }
+  counts.references_needed = needed;
+  counts.trunks = 7;
+  core::AdmitReferences{&counts, max_count}(0);
+  EXPECT_EQ(counts.trunks, 0u) << "a build that failed goes on with nothing";
+  EXPECT_ERROR(caught([&] { core::raise(counts.status, {}); }), ErrorCode::too_many_references,
+               needed);
+}
+
+// Where room was made beforehand, too little of it is an error that says how much there should be.
+TEST(ApiError, ReferenceCapacity) {
+  core::BuildCounts counts;
+  counts.references_needed = 1001;
+  core::AdmitReferences{&counts, 1000}(0);
+  const auto error = caught([&] { core::raise(counts.status, {}); });
+  EXPECT_ERROR(error, ErrorCode::reference_capacity, 1001);
+  EXPECT_NE(error.message.find("1000"), std::string::npos) << error.message;
 }
 
 }  // namespace

@@ -84,7 +84,7 @@ TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
       test::RayMaker maker(m.mesh, tree.view(), seed);
       std::vector<Ray> rays = maker.all_kinds(720);
       for (const std::vector<Ray>& more :
-           {scene::random_rays(tree.view().bounds, 100, seed),
+           {scene::random_rays(tree.view().bounds(), 100, seed),
             scene::rays_at_features(m.mesh, 100, seed), scene::axis_rays(m.mesh, 100, seed)}) {
         rays.insert(rays.end(), more.begin(), more.end());
       }

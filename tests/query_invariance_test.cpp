@@ -48,7 +48,7 @@ TEST(QueryInvariance, ScalingTheSceneByPowersOfTwo) {
     for (const References references : policies) {
       const Tree at_one = build(m.mesh.view(), options_for(references));
       std::vector<Ray> rays = scene::rays_at_features(m.mesh, 200, 80);
-      const std::vector<Ray> random = scene::random_rays(at_one.view().bounds, 50, 80);
+      const std::vector<Ray> random = scene::random_rays(at_one.view().bounds(), 50, 80);
       rays.insert(rays.end(), random.begin(), random.end());
       const std::vector<Hit> want = test::closest(at_one.view(), m.mesh.view(), rays);
       for (const int e : {-100, -60, -33, -20, -3, 1, 17, 30, 45, 100}) {
@@ -61,7 +61,7 @@ TEST(QueryInvariance, ScalingTheSceneByPowersOfTwo) {
                        });
         if (!exact) continue;  // the input itself underflows or overflows
         const Tree tree = build(scaled.view(), options_for(references));
-        ASSERT_EQ(tree.view().leaf_count, at_one.view().leaf_count);
+        ASSERT_EQ(tree.view().leaf_count(), at_one.view().leaf_count());
         ASSERT_TRUE(std::equal(tree.references().begin(), tree.references().end(),
                                at_one.references().begin(), at_one.references().end()));
         const float s = std::ldexp(1.0F, e);
@@ -139,7 +139,8 @@ TEST(QueryInvariance, ATriangleBehindTheHitLeavesTheHit) {
           p[(axis + 1) % 3] += 0.01F * static_cast<float>(c - 1);
           p[(axis + 2) % 3] += 0.01F * static_cast<float>(c % 2);
           for (int a = 0; a < 3; ++a) {
-            within = within && p[a] >= tree.view().bounds.lo[a] && p[a] <= tree.view().bounds.hi[a];
+            within =
+                within && p[a] >= tree.view().bounds().lo[a] && p[a] <= tree.view().bounds().hi[a];
           }
           more.positions.push_back(p);
         }

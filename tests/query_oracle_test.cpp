@@ -47,7 +47,7 @@ BuildOptions options_for(References references) {
 std::vector<Ray> rays_for(const test::NamedMesh& m, const Tree& tree, std::uint32_t count,
                           std::uint64_t seed) {
   std::vector<Ray> rays = test::RayMaker(m.mesh, tree.view(), seed).all_kinds(count);
-  for (const std::vector<Ray>& more : {scene::random_rays(tree.view().bounds, count / 4, seed),
+  for (const std::vector<Ray>& more : {scene::random_rays(tree.view().bounds(), count / 4, seed),
                                        scene::rays_at_features(m.mesh, count / 4, seed),
                                        scene::axis_rays(m.mesh, count / 4, seed)}) {
     rays.insert(rays.end(), more.begin(), more.end());
@@ -263,7 +263,7 @@ TEST(QueryOracleBunny, NothingOutsideTheBand) {
   verify::Summary total;
   for (const References references : {References::once, References::all}) {
     const Tree tree = build(m.mesh.view(), options_for(references));
-    std::vector<Ray> rays = primary_rays(tree.view().bounds, 128);
+    std::vector<Ray> rays = primary_rays(tree.view().bounds(), 128);
     const std::vector<Ray> hard = rays_for(m, tree, 4000, 120);
     rays.insert(rays.end(), hard.begin(), hard.end());
     const std::vector<Hit> hits = test::closest(tree.view(), m.mesh.view(), rays);

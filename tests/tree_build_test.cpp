@@ -110,17 +110,17 @@ void expect_equals_composition(const TriangleView& triangles, const BuildOptions
   const Composition want = compose(triangles, options);
   const Tree tree = build({.threads = 2}, triangles, options);
   const TreeView& view = tree.view();
-  ASSERT_EQ(view.leaf_count, want.first.size() - 1);
-  EXPECT_TRUE(view.root == want.root);
+  ASSERT_EQ(view.leaf_count(), want.first.size() - 1);
+  EXPECT_TRUE(view.root() == want.root);
   EXPECT_EQ(tree.statistics().crowded_trunks, want.crowded);
-  for (std::uint32_t leaf = 0; leaf <= view.leaf_count; ++leaf) {
+  for (std::uint32_t leaf = 0; leaf <= view.leaf_count(); ++leaf) {
     ASSERT_EQ(view.leaf_offsets[leaf], want.leaf_offsets[leaf]) << "leaf " << leaf;
     if (options.references == References::once) {
       ASSERT_EQ(view.leaf_offsets[leaf], want.first[leaf]) << "leaf " << leaf;
     }
   }
-  ASSERT_EQ(view.reference_count, want.references.size());
-  for (std::uint32_t i = 0; i < view.reference_count; ++i) {
+  ASSERT_EQ(view.reference_count(), want.references.size());
+  for (std::uint32_t i = 0; i < view.reference_count(); ++i) {
     ASSERT_EQ(view.references[i], want.references[i]) << "reference " << i;
   }
   for (std::uint32_t j = 0; j < view.node_count(); ++j) {
@@ -131,15 +131,15 @@ void expect_equals_composition(const TriangleView& triangles, const BuildOptions
     ASSERT_TRUE(node.child[0] == want.children[2 * j]) << "node " << j;
     ASSERT_TRUE(node.child[1] == want.children[2 * j + 1]) << "node " << j;
     ASSERT_EQ(node.axis, want.axes[j]) << "node " << j;
-    ASSERT_EQ(node.plane, want.planes[j] * view.scale) << "node " << j;
+    ASSERT_EQ(node.plane, want.planes[j] * view.scale()) << "node " << j;
   }
   EXPECT_EQ(tree.lattice().code_bits, want.lattice.code_bits);
   EXPECT_TRUE(std::equal(want.lattice.axis, want.lattice.axis + 64, tree.lattice().axis));
-  EXPECT_EQ(view.bounds.empty(), want.bounds.empty());
+  EXPECT_EQ(view.bounds().empty(), want.bounds.empty());
   if (want.bounds.empty()) return;
   for (int a = 0; a < 3; ++a) {
-    EXPECT_EQ(view.bounds.lo[a], want.bounds.lo[a]);
-    EXPECT_EQ(view.bounds.hi[a], want.bounds.hi[a]);
+    EXPECT_EQ(view.bounds().lo[a], want.bounds.lo[a]);
+    EXPECT_EQ(view.bounds().hi[a], want.bounds.hi[a]);
     EXPECT_EQ(tree.lattice().exponent[a], want.lattice.exponent[a]);
     EXPECT_EQ(tree.lattice().origin[a], want.lattice.origin[a]);
     EXPECT_EQ(tree.lattice().bits[a], want.lattice.bits[a]);
@@ -239,10 +239,10 @@ TEST(TreeBuild, NothingToBuild) {
     for (const scene::Mesh* mesh : {&no_mesh, &vertices_only, &std::as_const(zero_area)}) {
       const Tree tree = build(mesh->view(), {.references = references, .measure_quality = true});
       EXPECT_TRUE(tree.view().empty());
-      EXPECT_TRUE(tree.view().root.is_none());
-      EXPECT_TRUE(tree.view().bounds.empty());
+      EXPECT_TRUE(tree.view().root().is_none());
+      EXPECT_TRUE(tree.view().bounds().empty());
       EXPECT_EQ(tree.view().node_count(), 0u);
-      EXPECT_EQ(tree.view().reference_count, 0u);
+      EXPECT_EQ(tree.view().reference_count(), 0u);
       EXPECT_EQ(tree.nodes().size(), 0u);
       EXPECT_EQ(tree.references().size(), 0u);
       EXPECT_EQ(tree.statistics().leaves, 0u);
@@ -270,8 +270,8 @@ TEST(TreeBuild, OneAndTwoTriangles) {
   for (const References references : {References::once, References::all}) {
     const TriangleView one{std::span(corners).first(3)};
     const Tree first = build(one, {.references = references, .measure_quality = true});
-    EXPECT_TRUE(first.view().root == Link::leaf(0));
-    EXPECT_EQ(first.view().leaf_count, 1u);
+    EXPECT_TRUE(first.view().root() == Link::leaf(0));
+    EXPECT_EQ(first.view().leaf_count(), 1u);
     EXPECT_EQ(first.view().node_count(), 0u);
     EXPECT_EQ(first.leaf(0)[0], 0u);
     EXPECT_EQ(first.statistics().depth, 0u);
@@ -285,12 +285,12 @@ TEST(TreeBuild, OneAndTwoTriangles) {
 
     const TriangleView two{std::span(corners)};
     const Tree together = build(two, {.references = references, .leaf_size = 2});
-    EXPECT_EQ(together.view().leaf_count, 1u);
-    EXPECT_EQ(together.view().reference_count, 2u);
+    EXPECT_EQ(together.view().leaf_count(), 1u);
+    EXPECT_EQ(together.view().reference_count(), 2u);
     const Tree apart = build(two, {.references = references, .leaf_size = 1});
-    EXPECT_EQ(apart.view().leaf_count, 2u);
+    EXPECT_EQ(apart.view().leaf_count(), 2u);
     EXPECT_EQ(apart.view().node_count(), 1u);
-    EXPECT_TRUE(apart.view().root == Link::node(0));
+    EXPECT_TRUE(apart.view().root() == Link::node(0));
     EXPECT_EQ(apart.nodes()[0].axis, 0u);
     EXPECT_GT(apart.nodes()[0].plane, 0.5F);
     EXPECT_LE(apart.nodes()[0].plane, 8.5F);
@@ -309,7 +309,7 @@ TEST(TreeBuild, AMillionAlike) {
   for (const References references : {References::once, References::all}) {
     const scene::Mesh identical = scene::identical(1000000);
     const Tree tree = build(identical.view(), {.references = references, .measure_quality = true});
-    EXPECT_EQ(tree.view().leaf_count, 1u);
+    EXPECT_EQ(tree.view().leaf_count(), 1u);
     EXPECT_EQ(tree.statistics().largest_leaf, 1000000u);
     Ray ray;
     ray.origin = (identical.positions[0] + identical.positions[1] + identical.positions[2]) / 3.0F;
@@ -321,8 +321,9 @@ TEST(TreeBuild, AMillionAlike) {
 
     const scene::Mesh centres = scene::same_centre(1000000, 5);
     const Tree same = build(centres.view(), {.references = references});
-    EXPECT_EQ(same.view().leaf_count, 1u) << "equal codes that cannot be told apart stay together";
-    EXPECT_EQ(same.view().reference_count + same.statistics().skipped_zero_area, 1000000u);
+    EXPECT_EQ(same.view().leaf_count(), 1u)
+        << "equal codes that cannot be told apart stay together";
+    EXPECT_EQ(same.view().reference_count() + same.statistics().skipped_zero_area, 1000000u);
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   EXPECT_LT(seconds.count(), 60.0);
@@ -401,8 +402,8 @@ TEST(TreeBuild, StatisticsAreTrue) {
       EXPECT_EQ(s.skipped_zero_area, scene.zero_area);
       EXPECT_EQ(s.skipped_non_finite, scene.non_finite);
       EXPECT_EQ(s.nodes, tree.view().node_count());
-      EXPECT_EQ(s.leaves, tree.view().leaf_count);
-      EXPECT_EQ(s.references, tree.view().reference_count);
+      EXPECT_EQ(s.leaves, tree.view().leaf_count());
+      EXPECT_EQ(s.references, tree.view().reference_count());
       EXPECT_EQ(s.code_bits, tree.lattice().code_bits);
       EXPECT_EQ(s.skip(Skip::compaction).taken, scene.valid == m.mesh.faces.size());
       EXPECT_GE(s.tree_bytes, 64 * s.nodes + 4 * (s.leaves + s.references));
@@ -417,13 +418,13 @@ TEST(TreeBuild, StatisticsAreTrue) {
 
       double size[3];
       for (int a = 0; a < 3; ++a) {
-        size[a] = (static_cast<double>(tree.view().bounds.hi[a]) -
-                   static_cast<double>(tree.view().bounds.lo[a])) *
-                  static_cast<double>(tree.view().scale);
+        size[a] = (static_cast<double>(tree.view().bounds().hi[a]) -
+                   static_cast<double>(tree.view().bounds().lo[a])) *
+                  static_cast<double>(tree.view().scale());
       }
       if (area(size) == 0.0) continue;
       Quality quality;
-      measure(tree, tree.view().root, size, 0, area(size), quality);
+      measure(tree, tree.view().root(), size, 0, area(size), quality);
       EXPECT_EQ(s.depth, quality.depth);
       EXPECT_EQ(s.largest_leaf, quality.largest_leaf);
       EXPECT_NEAR(s.sah_cost, quality.cost, 1e-5 * quality.cost);
@@ -474,7 +475,7 @@ TEST(TreeBuild, CodeWidthFollowsTheNumberOfValidTriangles) {
   mesh.faces.resize(threshold - 1);
   for (std::uint32_t i = 0; i < mesh.faces.size(); ++i) mesh.faces[i] = shapes[i % 4];
   const Tree below = build(mesh.view());
-  ASSERT_EQ(below.view().reference_count, threshold - 1);
+  ASSERT_EQ(below.view().reference_count(), threshold - 1);
   EXPECT_EQ(below.options().code_bits, 32u);
 
   mesh.faces.insert(mesh.faces.end(), 10, glm::uvec3(3, 3, 3));

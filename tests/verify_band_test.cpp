@@ -295,9 +295,9 @@ TEST(VerifyBand, AWatertightIntersectorInFloatStaysWithin) {
   for (const int kind :
        {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 15, 16, 17, 18, 19, 20, 21, 22, 29}) {
     const test::NamedMesh named = test::small_mesh(kind, 5);
-    TreeView bounds;
-    bounds.bounds = scene::bounds(named.mesh);
-    test::RayMaker maker(named.mesh, bounds, static_cast<std::uint64_t>(kind));
+    TreeHeader header;
+    header.bounds = scene::bounds(named.mesh);
+    test::RayMaker maker(named.mesh, TreeView{&header}, static_cast<std::uint64_t>(kind));
     const std::vector<Ray> rays = maker.all_kinds(720);
     std::vector<Hit> answers;
     for (const Ray& ray : rays) answers.push_back(woop(named.mesh, ray));

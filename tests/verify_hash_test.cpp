@@ -18,7 +18,7 @@ struct SmallTree {
   std::vector<Node> nodes;
   std::vector<std::uint32_t> offsets = {0, 2, 3, 5};
   std::vector<std::uint32_t> references = {4, 1, 0, 3, 2};
-  TreeView view;
+  TreeHeader header;
 
   SmallTree() {
     for (std::uint32_t i = 0; i < 2; ++i) {
@@ -32,17 +32,14 @@ struct SmallTree {
       node.axis = i;
       nodes.push_back(node);
     }
-    view.leaf_count = 3;
-    view.reference_count = 5;
-    view.root = Link::node(0);
-    for (int axis = 0; axis < 3; ++axis) view.bounds.lo[axis] = view.bounds.hi[axis] = 1.0F;
+    header.leaf_count = 3;
+    header.reference_count = 5;
+    header.root = Link::node(0);
+    for (int axis = 0; axis < 3; ++axis) header.bounds.lo[axis] = header.bounds.hi[axis] = 1.0F;
   }
 
-  [[nodiscard]] TreeView now() {
-    view.nodes = nodes.data();
-    view.leaf_offsets = offsets.data();
-    view.references = references.data();
-    return view;
+  [[nodiscard]] TreeView now() const {
+    return {&header, nodes.data(), offsets.data(), references.data()};
   }
 };
 
@@ -59,13 +56,13 @@ TEST(VerifyHash, EveryFieldCounts) {
     ++changes;
   };
   expect_new([](SmallTree&) {});
-  expect_new([](SmallTree& t) { t.view.root = Link::node(1); });
-  expect_new([](SmallTree& t) { t.view.scale = 2.0F; });
-  expect_new([](SmallTree& t) { t.view.reference_count = 4; });
-  expect_new([](SmallTree& t) { t.view.leaf_count = 2; });
+  expect_new([](SmallTree& t) { t.header.root = Link::node(1); });
+  expect_new([](SmallTree& t) { t.header.scale = 2.0F; });
+  expect_new([](SmallTree& t) { t.header.reference_count = 4; });
+  expect_new([](SmallTree& t) { t.header.leaf_count = 2; });
   for (int axis = 0; axis < 3; ++axis) {
-    expect_new([axis](SmallTree& t) { t.view.bounds.lo[axis] = 0.5F; });
-    expect_new([axis](SmallTree& t) { t.view.bounds.hi[axis] = -0.0F; });
+    expect_new([axis](SmallTree& t) { t.header.bounds.lo[axis] = 0.5F; });
+    expect_new([axis](SmallTree& t) { t.header.bounds.hi[axis] = -0.0F; });
   }
   for (std::size_t node = 0; node < 2; ++node) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -80,7 +77,7 @@ TEST(VerifyHash, EveryFieldCounts) {
   }
   for (std::size_t i = 0; i < 4; ++i) expect_new([=](SmallTree& t) { ++t.offsets[i]; });
   for (std::size_t i = 0; i < 5; ++i) expect_new([=](SmallTree& t) { t.references[i] += 9; });
-  expect_new([](SmallTree& t) { t.view = TreeView{}; });
+  expect_new([](SmallTree& t) { t.header = TreeHeader{}; });
 }
 
 TEST(VerifyHash, CapacityAndAddressesDoNot) {

@@ -126,9 +126,9 @@ TEST(VerifyOracle, TheBoxTreeLosesNothing) {
   std::uint64_t hits = 0;
   for (int kind = 0; kind < test::small_mesh_kinds; ++kind) {
     const test::NamedMesh named = test::small_mesh(kind, 7);
-    TreeView bounds;
-    bounds.bounds = scene::bounds(named.mesh);
-    test::RayMaker maker(named.mesh, bounds, static_cast<std::uint64_t>(kind));
+    TreeHeader header;
+    header.bounds = scene::bounds(named.mesh);
+    test::RayMaker maker(named.mesh, TreeView{&header}, static_cast<std::uint64_t>(kind));
     const Oracle loop(named.mesh.view(), Oracle::Search::brute_force);
     const Oracle tree(named.mesh.view(), Oracle::Search::box_tree);
     for (const Ray& ray : maker.all_kinds(240)) {
@@ -148,9 +148,9 @@ TEST(VerifyOracle, TheBoxTreeLosesNothing) {
 TEST(VerifyOracle, ALargeSceneEqualsItsLoopOnSamples) {
   const scene::Mesh mesh = scene::sphere(5);
   ASSERT_GT(mesh.faces.size(), 10000u);
-  TreeView bounds;
-  bounds.bounds = scene::bounds(mesh);
-  test::RayMaker maker(mesh, bounds, 3);
+  TreeHeader header;
+  header.bounds = scene::bounds(mesh);
+  test::RayMaker maker(mesh, TreeView{&header}, 3);
   const Oracle loop(mesh.view(), Oracle::Search::brute_force);
   const Oracle automatic(mesh.view());
   for (const Ray& ray : maker.all_kinds(120)) {

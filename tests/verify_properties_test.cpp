@@ -21,13 +21,10 @@ struct HandTree {
   std::vector<Node> nodes;
   std::vector<std::uint32_t> offsets;
   std::vector<std::uint32_t> references;
-  TreeView view;
+  TreeHeader header;
 
-  [[nodiscard]] TreeView now() {
-    view.nodes = nodes.data();
-    view.leaf_offsets = offsets.data();
-    view.references = references.data();
-    return view;
+  [[nodiscard]] TreeView now() const {
+    return {&header, nodes.data(), offsets.data(), references.data()};
   }
   [[nodiscard]] std::vector<std::string> check() { return check_tree(now(), policy, mesh.view()); }
 };
@@ -82,10 +79,10 @@ HandTree small_once() {
                 node(0, 3.0F, Link::node(0), Link::leaf(2), box({0, 0, 0}, {3, 1, 3}), third)};
   tree.offsets = {0, 1, 3, 4};
   tree.references = {0, 2, 1, 3};
-  tree.view.leaf_count = 3;
-  tree.view.reference_count = 4;
-  tree.view.root = Link::node(1);
-  tree.view.bounds = box({0, 0, 0}, {5, 1, 3});
+  tree.header.leaf_count = 3;
+  tree.header.reference_count = 4;
+  tree.header.root = Link::node(1);
+  tree.header.bounds = box({0, 0, 0}, {5, 1, 3});
   return tree;
 }
 
@@ -102,10 +99,10 @@ HandTree small_all() {
                      box({2, 2, 0}, {4, 4, 1}))};
   tree.offsets = {0, 1, 2, 4};
   tree.references = {0, 0, 0, 1};
-  tree.view.leaf_count = 3;
-  tree.view.reference_count = 4;
-  tree.view.root = Link::node(0);
-  tree.view.bounds = box({0, 0, 0}, {4, 4, 1});
+  tree.header.leaf_count = 3;
+  tree.header.reference_count = 4;
+  tree.header.root = Link::node(0);
+  tree.header.bounds = box({0, 0, 0}, {4, 4, 1});
   return tree;
 }
 
@@ -130,9 +127,9 @@ TEST(VerifyProperties, GoodTreesAreAccepted) {
   add_triangle(leaf.mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   leaf.offsets = {0, 1};
   leaf.references = {0};
-  leaf.view.leaf_count = leaf.view.reference_count = 1;
-  leaf.view.root = Link::leaf(0);
-  leaf.view.bounds = box({0, 0, 0}, {1, 1, 0});
+  leaf.header.leaf_count = leaf.header.reference_count = 1;
+  leaf.header.root = Link::leaf(0);
+  leaf.header.bounds = box({0, 0, 0}, {1, 1, 0});
   EXPECT_EQ(leaf.check(), std::vector<std::string>());
   leaf.policy = References::all;
   EXPECT_EQ(leaf.check(), std::vector<std::string>());
@@ -141,7 +138,7 @@ TEST(VerifyProperties, GoodTreesAreAccepted) {
 
 TEST(VerifyProperties, TreeSpaceIsScaled) {
   for (HandTree tree : {small_once(), small_all()}) {
-    tree.view.scale = 0x1p-10F;
+    tree.header.scale = 0x1p-10F;
     EXPECT_FALSE(tree.check().empty());
     for (Node& node : tree.nodes) {
       for (auto& axis : node.bounds) {
@@ -155,11 +152,11 @@ TEST(VerifyProperties, TreeSpaceIsScaled) {
 
 TEST(VerifyProperties, Structure) {
   expect_broken(
-      small_once(), [](HandTree& t) { t.view.root = Link::node(0); }, "1", "leaf 1");
+      small_once(), [](HandTree& t) { t.header.root = Link::node(0); }, "1", "leaf 1");
   expect_broken(
-      small_once(), [](HandTree& t) { t.view.root = Link::leaf(0); }, "1", "leaf 0");
+      small_once(), [](HandTree& t) { t.header.root = Link::leaf(0); }, "1", "leaf 0");
   expect_broken(
-      small_once(), [](HandTree& t) { t.view.root = Link{}; }, "1", "nothing");
+      small_once(), [](HandTree& t) { t.header.root = Link{}; }, "1", "nothing");
   expect_broken(
       small_once(), [](HandTree& t) { t.nodes[0].child[0] = Link::leaf(2); }, "1", "leaf 2");
   expect_broken(
@@ -172,7 +169,7 @@ TEST(VerifyProperties, Structure) {
   expect_broken(
       small_once(), [](HandTree& t) { t.nodes[0].axis = 3; }, "1", "axis 3");
   expect_broken(
-      HandTree{}, [](HandTree& t) { t.view.root = Link::leaf(0); }, "1", "root");
+      HandTree{}, [](HandTree& t) { t.header.root = Link::leaf(0); }, "1", "root");
 }
 
 TEST(VerifyProperties, CellsTileTheScene) {
@@ -196,10 +193,10 @@ TEST(VerifyProperties, APlaneOnTheUpperFaceOfTheScene) {
                      box({1, 0, 0}, {1, 1, 1}))};
   tree.offsets = {0, 2, 3};
   tree.references = {0, 1, 1};
-  tree.view.leaf_count = 2;
-  tree.view.reference_count = 3;
-  tree.view.root = Link::node(0);
-  tree.view.bounds = box({0, 0, 0}, {1, 1, 1});
+  tree.header.leaf_count = 2;
+  tree.header.reference_count = 3;
+  tree.header.root = Link::node(0);
+  tree.header.bounds = box({0, 0, 0}, {1, 1, 1});
   EXPECT_EQ(tree.check(), std::vector<std::string>());
 }
 
@@ -214,12 +211,12 @@ TEST(VerifyProperties, ReferencesOnce) {
       [](HandTree& t) {
         t.references = {0, 2, 3};
         t.offsets = {0, 1, 2, 3};
-        t.view.reference_count = 3;
+        t.header.reference_count = 3;
       },
       "3", "triangle 1 is listed nowhere");
   HandTree lost;
   add_triangle(lost.mesh, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
-  lost.view.bounds = box({0, 0, 0}, {1, 1, 0});
+  lost.header.bounds = box({0, 0, 0}, {1, 1, 0});
   expect_broken(
       lost, [](HandTree&) {}, "3", "triangle 0");
 }
@@ -230,7 +227,7 @@ TEST(VerifyProperties, ReferencesInAllCells) {
       [](HandTree& t) {  // the point (2, 2)
         t.references = {0, 0, 1};
         t.offsets = {0, 1, 2, 3};
-        t.view.reference_count = 3;
+        t.header.reference_count = 3;
       },
       "3", "triangle 0 overlaps the cell of leaf 2");
   expect_broken(
@@ -241,16 +238,16 @@ TEST(VerifyProperties, ReferencesInAllCells) {
       [](HandTree& t) {
         t.references = {0, 1, 0, 0, 1};
         t.offsets = {0, 2, 3, 5};
-        t.view.reference_count = 5;
+        t.header.reference_count = 5;
       },
       "3", "triangle 1 is listed in leaf 0");
   // A gap too small to matter: the large triangle ends 1e-13 short of the corner it touched.
   HandTree near = small_all();
-  near.view.scale = 1.0F;
+  near.header.scale = 1.0F;
   near.mesh.positions[0] = {0, 0, -0x1p-45F};
   near.mesh.positions[1] = {4, 0, -0x1p-45F};
   near.mesh.positions[2] = {0, 4, -0x1p-45F};
-  near.view.bounds.lo[2] = -0x1p-45F;
+  near.header.bounds.lo[2] = -0x1p-45F;
   for (Node& node : near.nodes) node.bounds[2][0] = node.bounds[2][1] = -0x1p-45F;
   EXPECT_EQ(near.check(), std::vector<std::string>());
 }
@@ -266,21 +263,21 @@ TEST(VerifyProperties, ExtraReferencesWithinTheSlack) {
                      box({3, 0, 0}, {4, 1, 1}))};
   tree.offsets = {0, 1, 2};
   tree.references = {0, 1};
-  tree.view.leaf_count = tree.view.reference_count = 2;
-  tree.view.root = Link::node(0);
-  tree.view.bounds = box({0, 0, 0}, {4, 1, 1});
+  tree.header.leaf_count = tree.header.reference_count = 2;
+  tree.header.root = Link::node(0);
+  tree.header.bounds = box({0, 0, 0}, {4, 1, 1});
   EXPECT_EQ(tree.check(), std::vector<std::string>());
   tree.references = {0, 0, 1};
   tree.offsets = {0, 1, 3};
-  tree.view.reference_count = 3;
+  tree.header.reference_count = 3;
   expect_broken(
       tree, [](HandTree&) {}, "3", "triangle 0 is listed in leaf 1");
   // The same gap beside a coordinate of 10^6 is below the slack.
   add_triangle(tree.mesh, {3, 0, 0}, {1e6F, 0, 0}, {3, 1, 1});
   tree.references = {0, 0, 1, 2};
   tree.offsets = {0, 1, 4};
-  tree.view.reference_count = 4;
-  tree.view.bounds.hi[0] = tree.nodes[0].bounds[0][3] = 1e6F;
+  tree.header.reference_count = 4;
+  tree.header.bounds.hi[0] = tree.nodes[0].bounds[0][3] = 1e6F;
   const std::vector<std::string> found = tree.check();
   EXPECT_EQ(found, std::vector<std::string>());
 }
@@ -293,16 +290,16 @@ TEST(VerifyProperties, LeafLists) {
   expect_broken(
       small_once(), [](HandTree& t) { t.offsets[1] = 3; }, "4", "leaf 1 is empty");
   expect_broken(
-      small_once(), [](HandTree& t) { t.view.reference_count = 3; }, "4", "end at 4");
+      small_once(), [](HandTree& t) { t.header.reference_count = 3; }, "4", "end at 4");
   expect_broken(
       small_once(), [](HandTree& t) { t.references[2] = 5; }, "4", "triangle 5");
   expect_broken(
-      HandTree{}, [](HandTree& t) { t.view.reference_count = 1; }, "4", "1 references");
+      HandTree{}, [](HandTree& t) { t.header.reference_count = 1; }, "4", "1 references");
 }
 
 TEST(VerifyProperties, BoxesAndPlanes) {
   expect_broken(
-      small_once(), [](HandTree& t) { t.view.bounds.hi[2] = 4; }, "5", "scene box");
+      small_once(), [](HandTree& t) { t.header.bounds.hi[2] = 4; }, "5", "scene box");
   for (int which = 0; which < 2; ++which) {
     for (int axis = 0; axis < 3; ++axis) {
       for (const float by : {-0.125F, 0.125F}) {

@@ -19,6 +19,8 @@ enum class ErrorCode {
   non_finite_vertex,    ///< a triangle has a NaN or infinite coordinate; offender: the triangle
   too_many_triangles,   ///< more triangles than 31 bits count; offender: the count
   too_many_references,  ///< `all` needs more references than 31 bits count; offender: how many
+  reference_capacity,   ///< `all` on CUDA needs more references than
+                        ///< BuildOptions::reference_capacity; offender: how many
   invalid_view,         ///< null pointer, odd stride or misaligned data; offender: see the message
   invalid_option,       ///< an option is outside its documented range; offender: its value, 0 for
                         ///< one that is no integer

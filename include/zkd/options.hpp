@@ -66,6 +66,12 @@ struct BuildOptions {
   /// References per triangle that `budget` may use; finite, at least 1.
   float budget = 1.3F;
 
+  /// References that a CUDA build of `all` makes room for, at most max_count: there memory is taken
+  /// before anything is known of the scene. analyse() (zkd/cuda/build.hpp) finds it. Too little is
+  /// ErrorCode::reference_capacity, which says how many are needed; more changes nothing but the
+  /// memory. On the CPU, and with `once`, it is not looked at.
+  std::uint64_t reference_capacity = 0;
+
   /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
   /// 1024. Of 1, 2, 4 and 8, 4 was within 3 % of the best for build plus trace on Bunny and the
   /// best on Sibenik. Time of the trunk stage grows with it.

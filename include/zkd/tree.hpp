@@ -64,34 +64,62 @@ struct alignas(64) Node {
 };
 static_assert(sizeof(Node) == 64);
 
+/// What a tree says about itself. It lies where the tree lies: a build on the device fills it in
+/// there, and nothing has to come back to the host before rays are traced.
+struct TreeHeader {
+  Box bounds;          ///< tight box of all valid triangles, in the caller's units; empty for none
+  float scale = 1.0F;  ///< TreeView::scale()
+  Link root;           ///< a node; a leaf if there is only one; none if the tree is empty
+  std::uint32_t leaf_count = 0;
+  std::uint32_t reference_count = 0;
+};
+
+/// The longest path from the root to a leaf: what a stack for a walk has to hold.
+inline constexpr std::uint32_t max_depth = 96;
+
 /// A non-owning view of a finished tree: plain, to be passed to functions and kernels by value.
-/// Valid as long as its owner. Arrays lie where the tree was built, on the host or the device.
+/// Valid as long as its owner. Arrays lie where the tree was built, on the host or the device, and
+/// so does what the functions read: call those of a view of device memory on the device only.
 struct TreeView {
+  const TreeHeader* header = nullptr;           ///< null: an empty tree
   const Node* nodes = nullptr;                  ///< leaf_count - 1 of them (none for an empty tree)
   const std::uint32_t* leaf_offsets = nullptr;  ///< leaf_count + 1; leaf i lists references
                                                 ///< [leaf_offsets[i], leaf_offsets[i + 1])
   const std::uint32_t* references = nullptr;    ///< triangle ids, leaf by leaf
-  std::uint32_t leaf_count = 0;
-  std::uint32_t reference_count = 0;
-  Link root;   ///< a node; a leaf if there is only one; none if the tree is empty
-  Box bounds;  ///< tight box of all valid triangles, in the caller's units; empty for none
+
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t leaf_count() const {
+    return header != nullptr ? header->leaf_count : 0;
+  }
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t node_count() const {
+    return leaf_count() > 1 ? leaf_count() - 1 : 0;
+  }
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t reference_count() const {
+    return header != nullptr ? header->reference_count : 0;
+  }
+  [[nodiscard]] ZKD_HOST_DEVICE bool empty() const { return leaf_count() == 0; }
+
+  /// See TreeHeader::root.
+  [[nodiscard]] ZKD_HOST_DEVICE Link root() const {
+    return header != nullptr ? header->root : Link{};
+  }
+
+  /// See TreeHeader::bounds.
+  [[nodiscard]] ZKD_HOST_DEVICE Box bounds() const {
+    return header != nullptr ? header->bounds : Box{};
+  }
 
   /// Tree space: every position in `nodes` is the caller's times this power of two, 2^-126 to
   /// 2^127. It is 1 unless the scene's largest coordinate lies outside 2^-16 to 2^32; then that
   /// coordinate is brought near 1, so that products of three coordinates neither overflow nor
   /// lose digits. Scaling is exact but for what underflows: that is rounded to nearest.
-  float scale = 1.0F;
-
-  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t node_count() const {
-    return leaf_count > 1 ? leaf_count - 1 : 0;
+  [[nodiscard]] ZKD_HOST_DEVICE float scale() const {
+    return header != nullptr ? header->scale : 1.0F;
   }
-  [[nodiscard]] ZKD_HOST_DEVICE bool empty() const { return leaf_count == 0; }
 };
 
-/// Owns a finished tree in host memory: two blocks (nodes with leaf offsets, references) from the
-/// memory resource it was built with.
-/// Movable, not copyable by accident: see clone(). A tree moved from is an empty one. Reading one
-/// tree from several threads is safe.
+/// Owns a finished tree in host memory: two blocks (header, nodes and leaf offsets; references)
+/// from the memory resource it was built with. Movable, not copyable by accident: see clone(). A
+/// tree moved from is an empty one. Reading one tree from several threads is safe.
 class ZKD_API Tree {
  public:
   /// An empty tree: every ray misses.
@@ -113,9 +141,9 @@ class ZKD_API Tree {
     return {view_.nodes, view_.node_count()};
   }
   [[nodiscard]] std::span<const std::uint32_t> references() const noexcept {
-    return {view_.references, view_.reference_count};
+    return {view_.references, view_.reference_count()};
   }
-  /// Triangle ids that leaf `leaf` (below view().leaf_count) lists.
+  /// Triangle ids that leaf `leaf` (below view().leaf_count()) lists.
   [[nodiscard]] std::span<const std::uint32_t> leaf(std::uint32_t leaf) const {
     return {view_.references + view_.leaf_offsets[leaf],
             view_.references + view_.leaf_offsets[leaf + 1]};

@@ -6,12 +6,12 @@
 
 #include <cstdint>
 
+#include <zkd/traversal/arithmetic.hpp>
+#include <zkd/traversal/triangle.hpp>
 #include <zkd/tree.hpp>
 
-#include "core/arithmetic.hpp"
 #include "core/compress.hpp"
 #include "core/frame.hpp"
-#include "core/triangle.hpp"
 
 namespace zkd::core {
 

@@ -18,6 +18,8 @@ const char* to_string(ErrorCode code) noexcept {
       return "too_many_triangles";
     case ErrorCode::too_many_references:
       return "too_many_references";
+    case ErrorCode::reference_capacity:
+      return "reference_capacity";
     case ErrorCode::invalid_view:
       return "invalid_view";
     case ErrorCode::invalid_option:

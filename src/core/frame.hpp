@@ -6,8 +6,7 @@
 #include <cstdint>
 
 #include <zkd/geometry.hpp>
-
-#include "core/arithmetic.hpp"
+#include <zkd/traversal/arithmetic.hpp>
 
 namespace zkd::core {
 

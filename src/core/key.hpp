@@ -6,9 +6,9 @@
 
 #include <cstdint>
 
+#include <zkd/traversal/arithmetic.hpp>
+#include <zkd/tree.hpp>
 #include <zkd/trunk_key.hpp>
-
-#include "core/arithmetic.hpp"
 
 namespace zkd::core {
 
@@ -18,8 +18,7 @@ using stages::TrunkKey;
 /// Levels of a key: 64 of the code, 32 of the second round.
 inline constexpr std::uint32_t level_count = 96;
 
-/// The longest path from the root to a leaf: every level may split once.
-inline constexpr std::uint32_t max_depth = level_count;
+static_assert(max_depth == level_count, "every level may split once");
 
 /// The level at which two keys first differ; level_count if they are equal. The node of the
 /// conceptual tree at which they part has a prefix of this many bits.

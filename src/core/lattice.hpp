@@ -8,8 +8,7 @@
 #include <zkd/geometry.hpp>
 #include <zkd/lattice.hpp>
 #include <zkd/options.hpp>
-
-#include "core/arithmetic.hpp"
+#include <zkd/traversal/arithmetic.hpp>
 
 namespace zkd::core {
 

@@ -7,9 +7,8 @@
 
 #include <zkd/geometry.hpp>
 #include <zkd/lattice.hpp>
-
-#include "core/arithmetic.hpp"
-#include "core/triangle.hpp"
+#include <zkd/traversal/arithmetic.hpp>
+#include <zkd/traversal/triangle.hpp>
 
 namespace zkd::core {
 

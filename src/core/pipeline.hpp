@@ -27,6 +27,7 @@
 #include "core/planes.hpp"
 #include "core/recode.hpp"
 #include "core/references.hpp"
+#include "core/status.hpp"
 #include "core/trunks.hpp"
 #include "core/validate.hpp"
 #include "core/verbs.hpp"
@@ -36,17 +37,24 @@ namespace zkd::core {
 /// Small results of the stages, in the backend's memory.
 struct BuildState {
   ValidationReport report;
+  BuildCounts counts;
   Lattice lattice;
   MortonCoder coder;
   SceneFrame frame;
   Link root;
-  std::uint32_t left_out = 0;  ///< triangles that are not valid
-  std::uint32_t crowded_trunks = 0;
-  std::uint32_t crowded_triangles = 0;
-  std::uint32_t trunks = 0;
-  std::uint32_t nodes = 0;
-  std::uint64_t references_needed = 0;
-  std::uint32_t references = 0;
+};
+
+/// What a tree consists of, but for its references.
+struct TreeArrays {
+  TreeHeader* header;
+  Node* nodes;
+  std::uint32_t* leaf_offsets;
+
+  void lay_out(Arena& arena, std::size_t leaves) {
+    header = arena.take<TreeHeader>(1);
+    nodes = arena.take<Node>(leaves > 0 ? leaves - 1 : 0);
+    leaf_offsets = arena.take<std::uint32_t>(leaves + 1);
+  }
 };
 
 /// Everything whose size follows from the number of triangles.
@@ -76,29 +84,51 @@ struct Workspace {
   }
 };
 
-/// Lattice, coder and frame from what validation found.
+/// Lattice, coder and frame from what validation found; or the end of the build.
 struct PrepareScene {
   BuildState* state;
-  std::uint32_t triangle_count;
+  TriangleView triangles;
   std::uint32_t code_bits_asked;
   AxisOrder order;
+  InvalidTriangles invalid;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    const std::uint32_t bits = choose_code_bits(code_bits_asked, state->report.valid);
-    state->left_out = triangle_count - state->report.valid;
+    const auto given = static_cast<std::uint32_t>(triangles.triangle_count);
+    const std::uint32_t valid = state->report.valid;
+    state->counts = {};
+    state->counts.given = given;
+    state->counts.listed = valid;
+    state->counts.left_out = given - valid;
+    judge(state->report, triangles, invalid, state->counts);
+    if (state->counts.status.failed) state->report.bounds = Box{};
     state->root = Link{};
-    state->crowded_trunks = 0;
-    state->crowded_triangles = 0;
     state->frame = SceneFrame(state->report.bounds);
-    state->lattice = make_lattice(widen(state->report.bounds), bits, order, state->frame.finest);
+    state->lattice =
+        make_lattice(widen(state->report.bounds), choose_code_bits(code_bits_asked, valid), order,
+                     state->frame.finest);
     state->coder = MortonCoder(state->lattice);
   }
 };
 
 struct CountNodes {
-  BuildState* state;
+  BuildCounts* counts;
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    state->nodes = state->trunks > 0 ? state->trunks - 1 : 0;
+    counts->nodes = counts->trunks > 0 ? counts->trunks - 1 : 0;
+  }
+};
+
+/// What a finished tree says about itself.
+struct WriteHeader {
+  const BuildState* state;
+  TreeHeader* header;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
+    const bool failed = state->counts.status.failed;
+    header->bounds = failed ? Box{} : state->report.bounds;
+    header->scale = static_cast<float>(state->frame.scale);
+    header->root = failed ? Link{} : state->root;
+    header->leaf_count = state->counts.trunks;
+    header->reference_count = state->counts.references;
   }
 };
 
@@ -112,16 +142,14 @@ class MortonPipeline {
         options_(options),
         triangle_count_(static_cast<std::uint32_t>(triangles.triangle_count)) {}
 
-  /// Runs all stages. The tree's arrays are the backend's; `check(report)` may stop the build where
-  /// the backend can look at what validation found.
-  template <class Check>
-  void run(const Check& check) {
+  /// Runs all stages. The tree's arrays are the backend's.
+  void run() {
     Workspace<Code> work;
     backend_.take(work, triangle_count_);
     state_ = work.state;
+    counts_ = &work.state->counts;
 
-    validate(work);  // 1 validate.hpp, 2 lattice.hpp
-    check(state_->report);
+    validate(work);                              // 1 validate.hpp, 2 lattice.hpp
     encode(work);                                // 3 morton.hpp
     sort(work);                                  // 4 a verb of the backend
     const SortedKeys<Code> keys = recode(work);  // 5 recode.hpp
@@ -133,12 +161,14 @@ class MortonPipeline {
     tight_boxes(work);                           // 11 boxes.hpp
   }
 
-  [[nodiscard]] const BuildState& state() const { return *state_; }
+  /// What the stages found, in the backend's memory.
+  [[nodiscard]] const BuildState* state() const { return state_; }
 
  private:
-  [[nodiscard]] Count valid() const { return {&state_->report.valid, triangle_count_}; }
-  [[nodiscard]] Count trunks() const { return {&state_->trunks, triangle_count_}; }
-  [[nodiscard]] Count nodes() const { return {&state_->nodes, triangle_count_}; }
+  [[nodiscard]] Count given() const { return {&counts_->given, triangle_count_}; }
+  [[nodiscard]] Count listed() const { return {&counts_->listed, triangle_count_}; }
+  [[nodiscard]] Count trunks() const { return {&counts_->trunks, triangle_count_}; }
+  [[nodiscard]] Count nodes() const { return {&counts_->nodes, triangle_count_}; }
 
   /// Bits that a code may have; the lattice may use fewer, whose digits the sort leaves out.
   [[nodiscard]] std::uint32_t code_bits_bound() const {
@@ -150,25 +180,25 @@ class MortonPipeline {
     backend_.stage(Stage::validate);
     backend_.reduce(Count{nullptr, triangle_count_}, &state_->report,
                     ValidateTriangle{triangles_, work.boxes});
-    backend_.for_each(
-        one, PrepareScene{state_, triangle_count_, options_.code_bits, options_.axis_order});
+    backend_.for_each(one, PrepareScene{state_, triangles_, options_.code_bits, options_.axis_order,
+                                        options_.invalid_triangles});
+    backend_.raise(&counts_->status, triangles_);
   }
 
   void encode(Workspace<Code>& work) {
     backend_.stage(Stage::encode);
     std::uint32_t* ids = work.sort.values;
-    if (backend_.may_exist(Count{&state_->left_out, triangle_count_}))
-      backend_.select(Count{nullptr, triangle_count_}, IsListed{work.boxes}, ids,
-                      &state_->report.valid);
+    if (backend_.may_exist(Count{&counts_->left_out, triangle_count_}))
+      backend_.select(given(), IsListed{work.boxes}, ids, &counts_->listed);
     else
-      backend_.for_each(valid(), Number{ids});
-    backend_.for_each(valid(),
+      backend_.for_each(listed(), Number{ids});
+    backend_.for_each(listed(),
                       EncodeTriangle<Code>{work.boxes, ids, &state_->coder, work.sort.keys});
   }
 
   void sort(Workspace<Code>& work) {
     backend_.stage(Stage::sort);
-    work.sort = backend_.radix_sort(work.sort, valid(), code_bits_bound());
+    work.sort = backend_.radix_sort(work.sort, listed(), code_bits_bound());
   }
 
   SortedKeys<Code> recode(Workspace<Code>& work) {
@@ -178,12 +208,12 @@ class MortonPipeline {
     SecondRound<Code, Backend> round{work.boxes,
                                      work.sort.keys,
                                      work.sort.values,
-                                     valid(),
+                                     listed(),
                                      options_.leaf_size,
                                      options_.axis_order,
                                      &state_->frame,
-                                     &state_->crowded_trunks,
-                                     &state_->crowded_triangles,
+                                     &counts_->crowded_trunks,
+                                     &counts_->crowded_triangles,
                                      work.sort.other_values,  // free again after the sort
                                      work.trunk_first};       // not yet in use
     round.run(backend_);
@@ -195,10 +225,9 @@ class MortonPipeline {
   void find_trunks(Workspace<Code>& work, const SortedKeys<Code>& keys) {
     backend_.stage(Stage::trunks);
     using Keys = std::conditional_t<sizeof(Code) == 4, PackedKeys, SortedKeys<Code>>;
-    backend_.select(valid(),
-                    BeginsTrunk<Keys>{Keys{keys}, &state_->report.valid, options_.leaf_size},
-                    work.trunk_first, &state_->trunks);
-    backend_.for_each(one, CountNodes{state_});
+    backend_.select(listed(), BeginsTrunk<Keys>{Keys{keys}, &counts_->listed, options_.leaf_size},
+                    work.trunk_first, &counts_->trunks);
+    backend_.for_each(one, CountNodes{counts_});
     backend_.for_each(trunks(),
                       TrunkKeyOf<SortedKeys<Code>>{keys, work.trunk_first, work.trunk_keys});
     backend_.allocate_tree(trunks());
@@ -213,7 +242,7 @@ class MortonPipeline {
     backend_.stage(Stage::path_compression);
     const LinkWriter writer{backend_.nodes()->child, sizeof(Node) / sizeof(Link),
                             work.parents_of_nodes,   work.parents_of_leaves,
-                            &state_->root,           &state_->trunks};
+                            &state_->root,           &counts_->trunks};
     backend_.for_each(trunks(), LinkTrunk{work.levels, writer});
     backend_.for_each(nodes(), LinkEssentialNode{work.trunk_keys, work.levels, writer});
   }
@@ -221,7 +250,7 @@ class MortonPipeline {
   void split_planes(Workspace<Code>& work) {
     backend_.stage(Stage::split_planes);
     Node* nodes = backend_.nodes();
-    const CrowdByPosition crowd{work.trunk_first, recoded_.first, &state_->crowded_trunks,
+    const CrowdByPosition crowd{work.trunk_first, recoded_.first, &counts_->crowded_trunks,
                                 recoded_.lattices, recoded_.coders};
     backend_.for_each(this->nodes(),
                       PlaceSplitPlane<CrowdByPosition>{
@@ -237,9 +266,9 @@ class MortonPipeline {
   void list_references(Workspace<Code>& work) {
     backend_.stage(Stage::references);
     if (options_.references == References::once) {
-      backend_.for_each(one, ReferenceEachOnce{&state_->report.valid, &state_->references});
-      backend_.allocate_references(valid());
-      backend_.for_each(valid(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
+      backend_.for_each(one, ReferenceEachOnce{counts_});
+      backend_.allocate_references(listed());
+      backend_.for_each(listed(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
       backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.trunk_first, backend_.leaf_offsets()});
     } else {
       // Memory that earlier stages are done with.
@@ -256,21 +285,12 @@ class MortonPipeline {
                           work.parents_of_leaves,
                           &state_->coder,
                           &state_->frame};
-      ReferenceAll<Backend>{walk,
-                            work.trunk_first,
-                            valid(),
-                            trunks(),
-                            nodes(),
-                            backend_.nodes(),
-                            split_nodes,
-                            trunk_of,
-                            work.sort.other_values,
-                            &state_->references_needed,
-                            &state_->references}
-          .run(backend_);
+      ReferenceAll<Backend>{
+          walk,    work.trunk_first, listed(),    trunks(), nodes(),
+          counts_, backend_.nodes(), split_nodes, trunk_of, work.sort.other_values}
+          .run(backend_, triangles_);
     }
-    backend_.for_each(one,
-                      CloseOffsets{&state_->trunks, &state_->references, backend_.leaf_offsets()});
+    backend_.for_each(one, CloseOffsets{counts_, backend_.leaf_offsets()});
   }
 
   void tight_boxes(Workspace<Code>& work) {
@@ -280,6 +300,7 @@ class MortonPipeline {
                    TightBoxes{work.boxes, backend_.leaf_offsets(), backend_.references(),
                               work.parents_of_nodes, work.parents_of_leaves, &state_->frame,
                               options_.references == References::all, backend_.nodes()});
+    backend_.for_each(one, WriteHeader{state_, backend_.header()});
   }
 
   Backend& backend_;
@@ -287,6 +308,7 @@ class MortonPipeline {
   const BuildOptions& options_;
   std::uint32_t triangle_count_;
   BuildState* state_ = nullptr;
+  BuildCounts* counts_ = nullptr;
   RecodeWorkspace recoded_{};
 };
 

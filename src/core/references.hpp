@@ -6,16 +6,17 @@
 
 #include <cstdint>
 
+#include <zkd/traversal/arithmetic.hpp>
+#include <zkd/traversal/triangle.hpp>
 #include <zkd/tree.hpp>
 
 #include "core/arena.hpp"
-#include "core/arithmetic.hpp"
 #include "core/compress.hpp"
 #include "core/frame.hpp"
 #include "core/key.hpp"
 #include "core/morton.hpp"
 #include "core/search.hpp"
-#include "core/triangle.hpp"
+#include "core/status.hpp"
 #include "core/verbs.hpp"
 
 namespace zkd::core {
@@ -291,21 +292,19 @@ struct LeafOffset {
 
 /// Puts the end behind the offsets of all leaves.
 struct CloseOffsets {
-  const std::uint32_t* leaf_count;
-  const std::uint32_t* reference_count;
+  const BuildCounts* counts;
   std::uint32_t* leaf_offsets;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    leaf_offsets[*leaf_count] = *reference_count;
+    leaf_offsets[counts->trunks] = counts->references;
   }
 };
 
 /// `once`: as many references as valid triangles.
 struct ReferenceEachOnce {
-  const std::uint32_t* triangle_count;
-  std::uint32_t* reference_count;
+  BuildCounts* counts;
 
-  ZKD_HOST_DEVICE void operator()(std::uint32_t) const { *reference_count = *triangle_count; }
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const { counts->references = counts->listed; }
 };
 
 /// For References::all.
@@ -335,20 +334,24 @@ struct ReferenceAll {
   Count triangles;
   Count trunks;
   Count node_count;
+  BuildCounts* counts;  ///< what those three count; `references_needed` and `references` are made
   const Node* nodes;
   SplitNode* split_nodes;   ///< room for one per node; what `walk` reads
   std::uint32_t* trunk_of;  ///< room for one number per triangle; likewise
   std::uint32_t* offsets;   ///< likewise
-  std::uint64_t* needed;    ///< out: references, even if they are too many
-  std::uint32_t* count;     ///< out: references
 
-  void run(Backend& backend) {
+  void run(Backend& backend, const TriangleView& view) {
     backend.for_each(node_count, CopySplitNode{nodes, split_nodes});
     backend.for_each(trunks, LabelTrunk{trunk_first, trunks.actual, triangles.actual, trunk_of});
     NotesWorkspace noted{};
     backend.take(noted, triangles.bound);
-    backend.exclusive_scan(triangles, CountReferences{walk, noted.notes}, offsets, needed);
-    const Count references = backend.admit_references(needed, count);
+    backend.exclusive_scan(triangles, CountReferences{walk, noted.notes}, offsets,
+                           &counts->references_needed);
+    const std::uint64_t capacity = backend.reference_capacity();
+    backend.for_each(one, AdmitReferences{counts, capacity});
+    backend.raise(&counts->status, view);
+    const std::uint32_t* count = &counts->references;
+    const Count references{count, static_cast<std::uint32_t>(capacity)};
     ReferenceWorkspace pairs{};
     backend.take(pairs, backend.size(references));
     backend.for_each(triangles, WriteReferences{walk, noted.notes, offsets, triangles.actual, count,

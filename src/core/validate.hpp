@@ -6,9 +6,8 @@
 #include <cstdint>
 
 #include <zkd/geometry.hpp>
-
-#include "core/arithmetic.hpp"
-#include "core/triangle.hpp"
+#include <zkd/traversal/arithmetic.hpp>
+#include <zkd/traversal/triangle.hpp>
 
 namespace zkd::core {
 

@@ -19,9 +19,10 @@
 //                                      child has arrived (counted in `arrivals`, zero before); both
 //                                      return the way up. f.prefetch(leaf) may be called before
 //   may_exist(count), size(count)      what the host knows; where only the device does: true, bound
-//   admit_references(needed, out)      whether a tree can hold that many
+//   raise(status, triangles)           throws what the status says, if the host can look now
+//   reference_capacity()               how many references a tree may have
 //   take(layout, counts...)            arrays until the build ends
-//   allocate_tree, allocate_references the arrays of the tree, from then on at nodes(),
+//   allocate_tree, allocate_references the arrays of the tree, from then on at header(), nodes(),
 //                                      leaf_offsets(), references()
 //
 // A functor is copied for every range of elements that one thread works on. If it has a member
@@ -33,8 +34,7 @@
 #include <cstdint>
 
 #include <zkd/config.hpp>
-
-#include "core/arithmetic.hpp"
+#include <zkd/traversal/arithmetic.hpp>
 
 namespace zkd::core {
 

@@ -20,8 +20,8 @@
 #include <zkd/statistics.hpp>
 #include <zkd/tree.hpp>
 
+#include "core/check_input.hpp"
 #include "core/pipeline.hpp"
-#include "cpu/check_input.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/memory.hpp"
 #include "cpu/radix_sort.hpp"
@@ -203,14 +203,10 @@ class Backend {
   }
   [[nodiscard]] static bool may_exist(core::Count count) { return size(count) != 0; }
 
-  core::Count admit_references(const std::uint64_t* needed, std::uint32_t* out) {
-    if (*needed > max_count)
-      throw Error(ErrorCode::too_many_references, *needed,
-                  "References::all needs " + std::to_string(*needed) +
-                      " references, and a tree holds at most " + std::to_string(max_count));
-    *out = static_cast<std::uint32_t>(*needed);
-    return {out, *out};
+  static void raise(const core::BuildStatus* status, const TriangleView& triangles) {
+    core::raise(*status, triangles);
   }
+  [[nodiscard]] static std::uint64_t reference_capacity() { return max_count; }
 
   // --- memory ---
 
@@ -241,37 +237,26 @@ class Backend {
     const int team = Threads(executor).team(std::max<std::uint64_t>(triangles, reference_count));
     most.workspace_bytes += core::bytes_of(SortScratch{}, team, digits_of(64));
     most.tree_bytes =
-        core::bytes_of(TreeArrays{}, triangles) + reference_count * sizeof(std::uint32_t);
+        core::bytes_of(core::TreeArrays{}, triangles) + reference_count * sizeof(std::uint32_t);
     return most;
   }
 
   void allocate_tree(core::Count trunks) {
-    TreeArrays arrays{};
+    core::TreeArrays arrays{};
     tree_block_ = Block(memory_, core::bytes_of(arrays, size(trunks)));
     core::Arena arena(tree_block_.data());
     arrays.lay_out(arena, size(trunks));
-    nodes_ = arrays.nodes;
-    leaf_offsets_ = arrays.leaf_offsets;
+    arrays_ = arrays;
   }
   void allocate_references(core::Count references) {
     reference_block_ = Block(memory_, std::size_t{size(references)} * sizeof(std::uint32_t));
     references_ = static_cast<std::uint32_t*>(reference_block_.data());
   }
 
-  [[nodiscard]] Node* nodes() const { return nodes_; }
-  [[nodiscard]] std::uint32_t* leaf_offsets() const { return leaf_offsets_; }
+  [[nodiscard]] TreeHeader* header() const { return arrays_.header; }
+  [[nodiscard]] Node* nodes() const { return arrays_.nodes; }
+  [[nodiscard]] std::uint32_t* leaf_offsets() const { return arrays_.leaf_offsets; }
   [[nodiscard]] std::uint32_t* references() const { return references_; }
-
-  /// What a tree consists of, but for its references.
-  struct TreeArrays {
-    Node* nodes;
-    std::uint32_t* leaf_offsets;
-
-    void lay_out(core::Arena& arena, std::size_t leaves) {
-      nodes = arena.take<Node>(leaves > 0 ? leaves - 1 : 0);
-      leaf_offsets = arena.take<std::uint32_t>(leaves + 1);
-    }
-  };
 
   // --- clocks and counts ---
 
@@ -343,8 +328,7 @@ class Backend {
   std::size_t most_held_ = 0;
   Block tree_block_;
   Block reference_block_;
-  Node* nodes_ = nullptr;
-  std::uint32_t* leaf_offsets_ = nullptr;
+  core::TreeArrays arrays_{};
   std::uint32_t* references_ = nullptr;
 
   Stage running_ = Stage::count;

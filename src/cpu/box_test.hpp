@@ -3,7 +3,7 @@
 // core::BoxTest in vectors of four: low and high sides of both children at once, for AVX2 and FMA.
 #pragma once
 
-#include "core/traverse.hpp"
+#include <zkd/traversal/traverse.hpp>
 #include "cpu/instruction_set.hpp"
 
 #if defined(__x86_64__) && defined(__GNUC__)

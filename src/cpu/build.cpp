@@ -7,9 +7,9 @@
 #include <string>
 #include <utility>
 
+#include "core/check_input.hpp"
 #include "core/pipeline.hpp"
 #include "cpu/backend.hpp"
-#include "cpu/check_input.hpp"
 #include "cpu/quality.hpp"
 
 namespace zkd {
@@ -19,14 +19,7 @@ struct TreeAssembler {
   static Tree assemble(cpu::Backend& backend, const core::BuildState& state,
                        const BuildOptions& options) {
     Tree tree;
-    tree.view_.nodes = state.trunks > 1 ? backend.nodes() : nullptr;
-    tree.view_.leaf_offsets = backend.leaf_offsets();
-    tree.view_.references = backend.references();
-    tree.view_.leaf_count = state.trunks;
-    tree.view_.reference_count = state.references;
-    tree.view_.root = state.root;
-    tree.view_.bounds = state.report.bounds;
-    tree.view_.scale = static_cast<float>(state.frame.scale);
+    tree.view_ = {backend.header(), backend.nodes(), backend.leaf_offsets(), backend.references()};
     tree.lattice_ = state.lattice;
     tree.options_ = options;
     tree.memory_ = backend.memory();
@@ -60,18 +53,16 @@ void report_skips(const core::BuildState& state, const BuildOptions& options,
   report(Skip::flat_axes, flat);
   report(Skip::wide_codes,
          options.code_bits == 0 && state.report.valid < core::wide_code_threshold ? 32 : 0);
-  report(Skip::recoding, options.recode_crowded && state.crowded_trunks == 0 ? 1 : 0);
-  report(Skip::compaction, state.left_out == 0 ? 1 : 0);
+  report(Skip::recoding, options.recode_crowded && state.counts.crowded_trunks == 0 ? 1 : 0);
+  report(Skip::compaction, state.counts.left_out == 0 ? 1 : 0);
 }
 
 template <class Code>
 Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const BuildOptions& options) {
   core::MortonPipeline<Code, cpu::Backend> pipeline(backend, triangles, options);
-  pipeline.run([&](const core::ValidationReport& report) {
-    cpu::check_report(triangles, report, options.invalid_triangles);
-  });
+  pipeline.run();
   backend.finish();
-  const core::BuildState& state = pipeline.state();
+  const core::BuildState& state = *pipeline.state();
 
   BuildOptions used = options;
   used.backend = Backend::cpu;
@@ -82,11 +73,11 @@ Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const Buil
   statistics.skipped_zero_area = state.report.zero_area;
   statistics.skipped_non_finite = state.report.non_finite;
   statistics.code_bits = state.lattice.code_bits;
-  statistics.crowded_trunks = state.crowded_trunks;
-  statistics.crowded_triangles = state.crowded_triangles;
+  statistics.crowded_trunks = state.counts.crowded_trunks;
+  statistics.crowded_triangles = state.counts.crowded_triangles;
   statistics.nodes = tree.view().node_count();
-  statistics.leaves = tree.view().leaf_count;
-  statistics.references = tree.view().reference_count;
+  statistics.leaves = tree.view().leaf_count();
+  statistics.references = tree.view().reference_count();
   statistics.workspace_bytes = backend.workspace_bytes();
   statistics.stage_ms = backend.stage_ms();
   report_skips(state, options, backend.passes_left_out(), statistics);
@@ -99,8 +90,8 @@ Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const Buil
 Tree build(const cpu::Executor& executor, const TriangleView& triangles,
            const BuildOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  cpu::check_options(options);
-  cpu::check_view(triangles);
+  core::check_options(options);
+  core::check_view(triangles);
   cpu::check_executor(executor);
   cpu::Backend backend(executor);
   Tree tree = needs_wide_codes(options, triangles.triangle_count)
@@ -122,8 +113,8 @@ Tree build(const TriangleView& triangles, const BuildOptions& options) {
 MemoryRequirement memory_requirement(const cpu::Executor& executor, std::uint64_t triangle_count,
                                      const BuildOptions& options, std::uint64_t reference_count) {
   cpu::check_executor(executor);
-  cpu::check_options(options);
-  cpu::check_count(triangle_count);
+  core::check_options(options);
+  core::check_count(triangle_count);
   return cpu::Backend::requirement(
       executor, triangle_count, options, needs_wide_codes(options, triangle_count),
       options.references == References::once ? triangle_count : reference_count);

@@ -32,16 +32,16 @@ void measure_quality(const TreeView& tree, Statistics& statistics) noexcept {
     std::uint32_t depth;
     double area;
   };
-  Waiting stack[core::max_depth + 1];
+  Waiting stack[max_depth + 1];
   float lo[3];
   float hi[3];
   for (int a = 0; a < 3; ++a) {
-    lo[a] = tree.bounds.lo[a] * tree.scale;
-    hi[a] = tree.bounds.hi[a] * tree.scale;
+    lo[a] = tree.bounds().lo[a] * tree.scale();
+    hi[a] = tree.bounds().hi[a] * tree.scale();
   }
   const double whole = half_area(lo, hi);
   int waiting = 0;
-  stack[waiting++] = {tree.root, 0, whole};
+  stack[waiting++] = {tree.root(), 0, whole};
   double cost = 0.0;
   while (waiting > 0) {
     const Waiting at = stack[--waiting];

@@ -5,7 +5,8 @@
 
 #include <algorithm>
 
-#include "core/traverse.hpp"
+#include <zkd/traversal/traverse.hpp>
+
 #include "cpu/box_test.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/instruction_set.hpp"

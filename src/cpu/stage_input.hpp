@@ -9,10 +9,10 @@
 
 #include <zkd/error.hpp>
 
+#include "core/check_input.hpp"
 #include "core/validate.hpp"
 #include "core/verbs.hpp"
 #include "cpu/backend.hpp"
-#include "cpu/check_input.hpp"
 
 namespace zkd::stages {
 
@@ -50,7 +50,7 @@ void check_each(cpu::Backend& backend, Count count, const char* what, IsWrong is
 }
 
 inline Count exactly(std::size_t n) {
-  cpu::check_count(n);
+  core::check_count(n);
   return {nullptr, static_cast<std::uint32_t>(n)};
 }
 

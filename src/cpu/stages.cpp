@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <string>
 
+#include "core/check_input.hpp"
 #include "core/pipeline.hpp"
 #include "cpu/backend.hpp"
-#include "cpu/check_input.hpp"
 #include "cpu/stage_input.hpp"
 
 namespace zkd::stages {
@@ -17,7 +17,7 @@ namespace {
 void check_leaf_size(std::uint32_t leaf_size) {
   BuildOptions options;
   options.leaf_size = leaf_size;
-  cpu::check_options(options);
+  core::check_options(options);
 }
 
 template <class Code>
@@ -82,12 +82,14 @@ struct GivenKeys {
 
 SceneSummary triangle_boxes(const cpu::Executor& executor, const TriangleView& triangles,
                             InvalidTriangles invalid, std::span<Box> boxes) {
-  cpu::check_view(triangles);
+  core::check_view(triangles);
   check_length(boxes.size(), triangles.triangle_count, "boxes");
   cpu::Backend backend(executor);
   core::ValidationReport report;
   backend.reduce(exactly(boxes.size()), &report, core::ValidateTriangle{triangles, boxes.data()});
-  cpu::check_report(triangles, report, invalid);
+  core::BuildCounts counts;
+  core::judge(report, triangles, invalid, counts);
+  core::raise(counts.status, triangles);
   return {report.bounds, report.valid, report.zero_area, report.non_finite};
 }
 

@@ -7,11 +7,11 @@
 #include <algorithm>
 
 #include "core/boxes.hpp"
+#include "core/check_input.hpp"
 #include "core/frame.hpp"
 #include "core/morton.hpp"
 #include "core/references.hpp"
 #include "cpu/backend.hpp"
-#include "cpu/check_input.hpp"
 #include "cpu/stage_input.hpp"
 
 namespace zkd::stages {
@@ -102,7 +102,7 @@ class MadeTree {
 void check_references(References references) {
   BuildOptions options;
   options.references = references;
-  cpu::check_options(options);
+  core::check_options(options);
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ std::uint64_t list_references(const cpu::Executor& executor, const TriangleView&
                               std::span<std::uint32_t> leaf_offsets,
                               std::span<std::uint32_t> references) {
   check_references(policy);
-  cpu::check_view(triangles);
+  core::check_view(triangles);
   check_length(boxes.size(), triangles.triangle_count, "boxes");
   check_length(leaf_offsets.size(), skeleton.first.size() + 1, "leaf_offsets");
   cpu::Backend backend(executor);
@@ -150,20 +150,23 @@ std::uint64_t list_references(const cpu::Executor& executor, const TriangleView&
                               made.parents_of_leaves,
                               &coder,
                               &made.frame};
-    std::uint32_t count = 0;
+    core::BuildCounts counts;
+    counts.listed = valid.bound;
+    counts.trunks = trunks.bound;
+    counts.nodes = made.inner.bound;
     core::ReferenceAll<cpu::Backend>{walk,
                                      skeleton.first.data(),
-                                     Count{&valid.bound, valid.bound},
-                                     Count{&trunks.bound, trunks.bound},
-                                     made.inner,
+                                     Count{&counts.listed, valid.bound},
+                                     Count{&counts.trunks, trunks.bound},
+                                     Count{&counts.nodes, made.inner.bound},
+                                     &counts,
                                      backend.nodes(),
                                      room.split_nodes,
                                      room.trunk_of,
-                                     room.offsets,
-                                     &needed,
-                                     &count}
-        .run(backend);
-    const Count fit = exactly(std::min<std::size_t>(references.size(), count));
+                                     room.offsets}
+        .run(backend, triangles);
+    needed = counts.references_needed;
+    const Count fit = exactly(std::min<std::size_t>(references.size(), counts.references));
     backend.for_each(trunks, CopyTo<std::uint32_t>{backend.leaf_offsets(), leaf_offsets.data()});
     backend.for_each(fit, CopyTo<std::uint32_t>{backend.references(), references.data()});
   }

@@ -4,12 +4,14 @@
 #pragma once
 
 #include <omp.h>
-
 #include <algorithm>
 #include <cstdint>
+#include <string>
 
 #include <zkd/cpu/executor.hpp>
+#include <zkd/error.hpp>
 
+#include "core/check_input.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/instruction_set.hpp"
 
@@ -23,6 +25,15 @@ struct Range {
   std::uint32_t begin;
   std::uint32_t end;
 };
+
+/// Throws Error invalid_option.
+inline void check_executor(const Executor& executor) {
+  if (executor.threads < 0)
+    throw Error(ErrorCode::invalid_option, static_cast<std::uint64_t>(executor.threads),
+                "threads is " + std::to_string(executor.threads) + "; it must not be negative");
+  core::check_enumerator(static_cast<std::int64_t>(executor.instructions),
+                         static_cast<std::int64_t>(InstructionSet::avx2), "instructions");
+}
 
 class Threads {
  public:

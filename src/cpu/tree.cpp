@@ -53,6 +53,7 @@ Tree Tree::clone(std::pmr::memory_resource* memory) const {
     std::memcpy(copy.node_block_.data, node_block_.data, node_block_.bytes);
   if (reference_block_.bytes != 0)
     std::memcpy(copy.reference_block_.data, reference_block_.data, reference_block_.bytes);
+  copy.view_.header = moved(node_block_, copy.node_block_, view_.header);
   copy.view_.nodes = moved(node_block_, copy.node_block_, view_.nodes);
   copy.view_.leaf_offsets = moved(node_block_, copy.node_block_, view_.leaf_offsets);
   copy.view_.references = moved(reference_block_, copy.reference_block_, view_.references);

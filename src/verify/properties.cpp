@@ -52,7 +52,7 @@ class Checker {
       : tree_(tree),
         triangles_(triangles),
         strict_(references == References::all),
-        scale_(static_cast<double>(tree.scale)) {}
+        scale_(static_cast<double>(tree.scale())) {}
 
   std::vector<std::string> run() {
     measure_triangles();
@@ -107,12 +107,12 @@ class Checker {
   }
 
   void structure() {
-    const std::uint32_t leaves = tree_.leaf_count;
+    const std::uint32_t leaves = tree_.leaf_count();
     if (leaves == 0) {
-      if (!tree_.root.is_none()) report(1, "a tree without leaves has a root");
+      if (!tree_.root().is_none()) report(1, "a tree without leaves has a root");
       return;
     }
-    std::vector<Subtree> stack{{tree_.root, 0, leaves - 1}};
+    std::vector<Subtree> stack{{tree_.root(), 0, leaves - 1}};
     while (!stack.empty()) {
       const auto [link, first, last] = stack.back();
       stack.pop_back();
@@ -141,10 +141,10 @@ class Checker {
   }
 
   void leaf_lists() {
-    const std::uint32_t leaves = tree_.leaf_count;
+    const std::uint32_t leaves = tree_.leaf_count();
     if (leaves == 0) {
-      if (tree_.reference_count != 0) {
-        report(4, "a tree without leaves has ", tree_.reference_count, " references");
+      if (tree_.reference_count() != 0) {
+        report(4, "a tree without leaves has ", tree_.reference_count(), " references");
       }
       return;
     }
@@ -160,12 +160,12 @@ class Checker {
         return;
       }
     }
-    if (offsets[leaves] != tree_.reference_count) {
-      report(4, "leaf_offsets end at ", offsets[leaves], ", but there are ", tree_.reference_count,
-             " references");
+    if (offsets[leaves] != tree_.reference_count()) {
+      report(4, "leaf_offsets end at ", offsets[leaves], ", but there are ",
+             tree_.reference_count(), " references");
       return;
     }
-    for (std::uint32_t i = 0; i < tree_.reference_count; ++i) {
+    for (std::uint32_t i = 0; i < tree_.reference_count(); ++i) {
       if (tree_.references[i] >= triangles_.triangle_count) {
         report(4, "reference ", i, " names triangle ", tree_.references[i], " of ",
                triangles_.triangle_count);
@@ -177,9 +177,9 @@ class Checker {
   void scene_box() {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       // Both infinities of an empty box survive the scale.
-      if (static_cast<double>(tree_.bounds.lo[axis]) * scale_ != scene_.lo[axis] ||
-          static_cast<double>(tree_.bounds.hi[axis]) * scale_ != scene_.hi[axis]) {
-        report(5, "the scene box is ", tree_.bounds.lo[axis], " to ", tree_.bounds.hi[axis],
+      if (static_cast<double>(tree_.bounds().lo[axis]) * scale_ != scene_.lo[axis] ||
+          static_cast<double>(tree_.bounds().hi[axis]) * scale_ != scene_.hi[axis]) {
+        report(5, "the scene box is ", tree_.bounds().lo[axis], " to ", tree_.bounds().hi[axis],
                " along ", axis_name[axis], ", the valid triangles are ", scene_.lo[axis] / scale_,
                " to ", scene_.hi[axis] / scale_);
         return;
@@ -199,7 +199,7 @@ class Checker {
   void listed_once() {
     constexpr std::uint32_t nowhere = 0xFFFFFFFFU;
     std::vector<std::uint32_t> leaf_of(corners_.size(), nowhere);
-    for (std::uint32_t leaf = 0; leaf < tree_.leaf_count; ++leaf) {
+    for (std::uint32_t leaf = 0; leaf < tree_.leaf_count(); ++leaf) {
       for (std::uint32_t i = tree_.leaf_offsets[leaf]; i < tree_.leaf_offsets[leaf + 1]; ++i) {
         const std::uint32_t triangle = tree_.references[i];
         if (!corners_[triangle]) {
@@ -230,8 +230,8 @@ class Checker {
       ExactBox cell;
       bool cut[3];  // the upper face is a plane, not the scene box's own
     };
-    cells_.resize(tree_.leaf_count);
-    std::vector<Entry> stack{{tree_.root, scene_, {false, false, false}}};
+    cells_.resize(tree_.leaf_count());
+    std::vector<Entry> stack{{tree_.root(), scene_, {false, false, false}}};
     while (!stack.empty()) {
       const Entry entry = stack.back();
       stack.pop_back();
@@ -272,7 +272,7 @@ class Checker {
     const Corners& corners = *corners_[triangle];
     const ExactBox box = box_of(corners);
     leaves.clear();
-    std::vector<Entry> stack{{tree_.root, scene_}};
+    std::vector<Entry> stack{{tree_.root(), scene_}};
     while (!stack.empty()) {
       const Entry entry = stack.back();
       stack.pop_back();
@@ -299,11 +299,11 @@ class Checker {
   void listed_where_it_overlaps() {
     // leaves_of[first[t] .. first[t + 1]): where triangle t is listed, ascending.
     std::vector<std::uint32_t> first(corners_.size() + 1, 0);
-    for (std::uint32_t i = 0; i < tree_.reference_count; ++i) ++first[tree_.references[i] + 1];
+    for (std::uint32_t i = 0; i < tree_.reference_count(); ++i) ++first[tree_.references[i] + 1];
     for (std::size_t i = 0; i < corners_.size(); ++i) first[i + 1] += first[i];
-    std::vector<std::uint32_t> leaves_of(tree_.reference_count);
+    std::vector<std::uint32_t> leaves_of(tree_.reference_count());
     std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-    for (std::uint32_t leaf = 0; leaf < tree_.leaf_count; ++leaf) {
+    for (std::uint32_t leaf = 0; leaf < tree_.leaf_count(); ++leaf) {
       for (std::uint32_t i = tree_.leaf_offsets[leaf]; i < tree_.leaf_offsets[leaf + 1]; ++i) {
         leaves_of[next[tree_.references[i]]++] = leaf;
       }
@@ -458,7 +458,7 @@ std::uint32_t tree_depth(const TreeView& tree) {
   };
   std::uint32_t deepest = 0;
   std::vector<Entry> stack;
-  if (!tree.empty()) stack.push_back({tree.root, 0});
+  if (!tree.empty()) stack.push_back({tree.root(), 0});
   while (!stack.empty()) {
     const Entry entry = stack.back();
     stack.pop_back();

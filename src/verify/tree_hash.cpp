@@ -3,6 +3,7 @@
 // XXH3-128 over the named fields of a tree.
 #include "verify/tree_hash.hpp"
 
+#include <xxhash.h>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -10,8 +11,6 @@
 #include <new>
 #include <stdexcept>
 #include <vector>
-
-#include <xxhash.h>
 
 namespace zkd::verify {
 namespace {
@@ -61,12 +60,13 @@ class Hasher {
 
 // Everything but the references.
 void add_structure(Hasher& hasher, const TreeView& tree) {
-  hasher.add(tree.leaf_count);
-  hasher.add(tree.reference_count);
-  hasher.add(tree.root.bits);
-  for (const float x : tree.bounds.lo) hasher.add(x);
-  for (const float x : tree.bounds.hi) hasher.add(x);
-  hasher.add(tree.scale);
+  hasher.add(tree.leaf_count());
+  hasher.add(tree.reference_count());
+  hasher.add(tree.root().bits);
+  const Box bounds = tree.bounds();
+  for (const float x : bounds.lo) hasher.add(x);
+  for (const float x : bounds.hi) hasher.add(x);
+  hasher.add(tree.scale());
   for (std::uint32_t i = 0; i < tree.node_count(); ++i) {
     const Node& node = tree.nodes[i];
     for (const auto& axis : node.bounds) {
@@ -76,8 +76,8 @@ void add_structure(Hasher& hasher, const TreeView& tree) {
     hasher.add(node.plane);
     hasher.add(node.axis);
   }
-  if (tree.leaf_count > 0) {
-    for (std::uint32_t i = 0; i <= tree.leaf_count; ++i) hasher.add(tree.leaf_offsets[i]);
+  if (tree.leaf_count() > 0) {
+    for (std::uint32_t i = 0; i <= tree.leaf_count(); ++i) hasher.add(tree.leaf_offsets[i]);
   }
 }
 
@@ -86,7 +86,7 @@ void add_structure(Hasher& hasher, const TreeView& tree) {
 std::string tree_hash(const TreeView& tree) {
   Hasher hasher;
   add_structure(hasher, tree);
-  for (std::uint32_t i = 0; i < tree.reference_count; ++i) hasher.add(tree.references[i]);
+  for (std::uint32_t i = 0; i < tree.reference_count(); ++i) hasher.add(tree.references[i]);
   return hasher.digits();
 }
 
@@ -94,7 +94,7 @@ std::string tree_hash_mapped(const TreeView& tree, std::span<const std::uint32_t
   Hasher hasher;
   add_structure(hasher, tree);
   std::vector<std::uint32_t> ids;
-  for (std::uint32_t leaf = 0; leaf < tree.leaf_count; ++leaf) {
+  for (std::uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf) {
     ids.assign(tree.references + tree.leaf_offsets[leaf],
                tree.references + tree.leaf_offsets[leaf + 1]);
     for (std::uint32_t& id : ids) {

@@ -26,8 +26,8 @@ class RayMaker {
   RayMaker(const scene::Mesh& mesh, const TreeView& tree, std::uint64_t seed)
       : mesh_(mesh), tree_(tree), random_(seed) {
     for (int a = 0; a < 3; ++a) {
-      lo_[a] = tree.bounds.empty() ? -1.0F : tree.bounds.lo[a];
-      extent_[a] = tree.bounds.empty() ? 2.0F : tree.bounds.hi[a] / 2 - tree.bounds.lo[a] / 2;
+      lo_[a] = tree.bounds().empty() ? -1.0F : tree.bounds().lo[a];
+      extent_[a] = tree.bounds().empty() ? 2.0F : tree.bounds().hi[a] / 2 - tree.bounds().lo[a] / 2;
     }
     size_ = std::max({extent_.x, extent_.y, extent_.z, std::numeric_limits<float>::denorm_min()});
   }
@@ -152,7 +152,7 @@ class RayMaker {
     }
     const Node& node = tree_.nodes[random_.below(tree_.node_count())];
     axis = node.axis;
-    return node.plane / tree_.scale;
+    return node.plane / tree_.scale();
   }
 
   Ray in_plane() {

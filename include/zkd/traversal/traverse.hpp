@@ -10,11 +10,9 @@
 #include <cstdint>
 
 #include <zkd/query.hpp>
+#include <zkd/traversal/intersect.hpp>
+#include <zkd/traversal/ray.hpp>
 #include <zkd/tree.hpp>
-
-#include "core/intersect.hpp"
-#include "core/key.hpp"
-#include "core/ray.hpp"
 
 namespace zkd::core {
 
@@ -64,7 +62,7 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
   Waiting stack[max_depth];
   std::uint32_t waiting = 0;
   Candidate best;
-  Link link = tree.root;
+  Link link = tree.root();
   std::uint32_t node_visits = 0;
   std::uint32_t triangle_tests = 0;
 

@@ -7,9 +7,8 @@
 #include <cstdint>
 
 #include <zkd/geometry.hpp>
+#include <zkd/traversal/arithmetic.hpp>
 #include <zkd/tree.hpp>
-
-#include "core/arithmetic.hpp"
 
 namespace zkd::core {
 
@@ -48,7 +47,7 @@ struct PreparedRay {
   bool valid = false;
 
   ZKD_HOST_DEVICE PreparedRay(const TreeView& tree, const Ray& ray)
-      : t_min(ray.t_min), t_max(ray.t_max), scale(tree.scale) {
+      : t_min(ray.t_min), t_max(ray.t_max), scale(tree.scale()) {
     const float origin_in[3] = {ray.origin.x, ray.origin.y, ray.origin.z};
     const float direction_in[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
     float longest = 0.0F;
@@ -62,7 +61,7 @@ struct PreparedRay {
     // space; both are exact in double.
     const int direction_exponent = exponent_of(static_cast<double>(longest));
     const Wide direction_scale = power_of_two(-direction_exponent);
-    const Wide wide_scale = static_cast<double>(tree.scale);
+    const Wide wide_scale = static_cast<double>(tree.scale());
     t_scale = direction_scale / wide_scale;
     const Wide to_tree = Wide(power_of_two(direction_exponent)) * wide_scale;
 
@@ -75,8 +74,8 @@ struct PreparedRay {
     for (int a = 0; a < 3; ++a) {
       from[a] = Wide(static_cast<double>(origin_in[a])) * wide_scale;
       direction[a] = Wide(static_cast<double>(direction_in[a])) * direction_scale;
-      low[a] = Wide(static_cast<double>(tree.bounds.lo[a])) * wide_scale;
-      high[a] = Wide(static_cast<double>(tree.bounds.hi[a])) * wide_scale;
+      low[a] = Wide(static_cast<double>(tree.bounds().lo[a])) * wide_scale;
+      high[a] = Wide(static_cast<double>(tree.bounds().hi[a])) * wide_scale;
       coordinate = larger(coordinate, larger(magnitude(low[a].value), magnitude(high[a].value)));
       distance = larger(distance, larger((low[a] - from[a]).value, (from[a] - high[a]).value));
     }

@@ -14,10 +14,9 @@
 #include <cstdint>
 
 #include <zkd/geometry.hpp>
-
-#include "core/arithmetic.hpp"
-#include "core/ray.hpp"
-#include "core/triangle.hpp"
+#include <zkd/traversal/arithmetic.hpp>
+#include <zkd/traversal/ray.hpp>
+#include <zkd/traversal/triangle.hpp>
 
 namespace zkd::core {
 

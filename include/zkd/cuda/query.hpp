@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Rays through a tree in device memory. The rules and the answers are those of zkd/query.hpp, bit
+// for bit. To trace from inside a kernel see zkd/cuda/device.hpp.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include <zkd/config.hpp>
+#include <zkd/cuda/executor.hpp>
+#include <zkd/geometry.hpp>
+#include <zkd/query.hpp>
+#include <zkd/tree.hpp>
+
+namespace zkd {
+
+/// closest_hit for each ray. All spans and views are device memory: `tree` is cuda::Tree::view(),
+/// `triangles` cuda::Tree::triangles(). hits[i] belongs to rays[i]. Enqueued on the executor's
+/// stream; returns at once. Allocates nothing; may be captured in a graph.
+///
+/// `hits` (and `costs`, unless empty) should be as long as `rays`; a shorter one ends the work at
+/// its length. Spans must not overlap. Throws Error backend_unavailable, device_failure.
+ZKD_API void closest_hit(const cuda::Executor& executor, const TreeView& tree,
+                         const TriangleView& triangles, std::span<const Ray> rays,
+                         std::span<Hit> hits, std::span<TraversalCost> costs = {});
+
+/// any_hit for each ray: occluded[i] is 1 if rays[i] hits anything, else 0. As above otherwise.
+ZKD_API void any_hit(const cuda::Executor& executor, const TreeView& tree,
+                     const TriangleView& triangles, std::span<const Ray> rays,
+                     std::span<std::uint8_t> occluded, std::span<TraversalCost> costs = {});
+
+/// The same answers by a loop over all triangles; see zkd/query.hpp. As above otherwise.
+ZKD_API void closest_hit_brute_force(const cuda::Executor& executor, const TreeView& tree,
+                                     const TriangleView& triangles, std::span<const Ray> rays,
+                                     std::span<Hit> hits);
+
+}  // namespace zkd

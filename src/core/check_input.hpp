@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What every backend checks before it begins, for builds and for single stages.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/error.hpp>
+#include <zkd/geometry.hpp>
+#include <zkd/options.hpp>
+
+namespace zkd::core {
+
+/// Throws Error invalid_view or too_many_triangles.
+ZKD_API void check_view(const TriangleView& triangles);
+
+/// Throws Error too_many_triangles.
+ZKD_API void check_count(std::uint64_t triangle_count);
+
+/// Throws Error invalid_option or unsupported_option.
+ZKD_API void check_options(const BuildOptions& options);
+
+/// Throws Error invalid_option where `value` is no enumerator of an enumeration that ends in
+/// `last`.
+ZKD_API void check_enumerator(std::int64_t value, std::int64_t last, const char* option);
+
+}  // namespace zkd::core

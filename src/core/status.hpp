@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a build counts and what stops it, in the backend's memory.
+//
+// A build that fails goes on with nothing: the counts that size its passes become 0, the tree is
+// left empty, and the status says why. The CPU looks at once and throws; on a device nobody waits,
+// and the tree's owner throws when asked (raise).
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/error.hpp>
+#include <zkd/geometry.hpp>
+#include <zkd/options.hpp>
+#include <zkd/tree.hpp>
+
+#include "core/validate.hpp"
+
+namespace zkd::core {
+
+/// Why a build came to no tree.
+struct BuildStatus {
+  bool failed = false;
+  ErrorCode code{};
+  std::uint64_t offender = 0;    ///< as Error::offender
+  std::uint64_t detail[2] = {};  ///< what else the message tells; see raise
+};
+
+/// Throws the Error that `status` stands for, if any. For a build over `triangles`.
+ZKD_API void raise(const BuildStatus& status, const TriangleView& triangles);
+
+/// Numbers that the scene decides.
+struct BuildCounts {
+  BuildStatus status;
+  std::uint32_t given = 0;   ///< triangles; 0 after a failure
+  std::uint32_t listed = 0;  ///< triangles that go into the tree
+  std::uint32_t left_out = 0;
+  std::uint32_t crowded_trunks = 0;
+  std::uint32_t crowded_triangles = 0;
+  std::uint32_t trunks = 0;
+  std::uint32_t nodes = 0;
+  std::uint32_t references = 0;
+  std::uint64_t references_needed = 0;
+
+  ZKD_HOST_DEVICE void fail(ErrorCode code, std::uint64_t offender, std::uint64_t first = 0,
+                            std::uint64_t second = 0) {
+    status = {true, code, offender, {first, second}};
+    given = listed = left_out = trunks = nodes = references = 0;
+  }
+};
+
+/// Stops a build that validation has found wrong. Out of range before not finite; of several
+/// triangles, the first.
+ZKD_HOST_DEVICE inline void judge(const ValidationReport& report, const TriangleView& triangles,
+                                  InvalidTriangles invalid, BuildCounts& counts) {
+  if (report.first_out_of_range != none_found) {
+    const std::uint32_t first = report.first_out_of_range;
+    int corner = 0;
+    while (triangles.index(first, corner) < triangles.position_count) ++corner;
+    counts.fail(ErrorCode::index_out_of_range, first, static_cast<std::uint64_t>(corner),
+                triangles.index(first, corner));
+  } else if (report.non_finite != 0 && invalid == InvalidTriangles::error) {
+    counts.fail(ErrorCode::non_finite_vertex, report.first_non_finite, report.non_finite);
+  }
+}
+
+/// Whether a tree may have as many references as it needs; stops the build if not.
+struct AdmitReferences {
+  BuildCounts* counts;
+  std::uint64_t capacity;  ///< max_count, or less where room was made beforehand
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
+    const std::uint64_t needed = counts->references_needed;
+    if (needed > max_count)
+      counts->fail(ErrorCode::too_many_references, needed);
+    else if (needed > capacity)
+      counts->fail(ErrorCode::reference_capacity, needed, capacity);
+    else
+      counts->references = static_cast<std::uint32_t>(needed);
+  }
+};
+
+}  // namespace zkd::core
