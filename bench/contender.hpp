@@ -4,6 +4,7 @@
 // its peers look the same from here, so that all are measured by the same loop.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -14,6 +15,7 @@
 #include <zkd/geometry.hpp>
 
 #include "results.hpp"
+#include "spread.hpp"
 
 namespace zkd::bench {
 
@@ -28,6 +30,15 @@ class Stopwatch {
   using Clock = std::chrono::steady_clock;
   Clock::time_point begin_ = Clock::now();
 };
+
+/// Rays that hit something.
+[[nodiscard]] inline std::uint64_t count_hits(std::span<const Hit> hits) {
+  return static_cast<std::uint64_t>(std::count_if(
+      hits.begin(), hits.end(), [](const Hit& hit) { return hit.triangle != no_triangle; }));
+}
+[[nodiscard]] inline std::uint64_t count_hits(std::span<const std::uint8_t> occluded) {
+  return static_cast<std::uint64_t>(std::count(occluded.begin(), occluded.end(), std::uint8_t{1}));
+}
 
 class Contender {
  public:
@@ -52,7 +63,7 @@ class Contender {
   /// threads. The hits are written to memory within the time.
   virtual Timing trace(std::size_t way, RayKind kind, std::span<const Ray> rays) = 0;
 
-  /// Frees what was built.
+  /// Frees what was built, or keeps its memory for the next build() where that is how it builds.
   virtual void clear() = 0;
 };
 

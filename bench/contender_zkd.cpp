@@ -1,48 +1,101 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// zkd under the clock: the calls a user makes, nothing prepared beforehand.
+// zkd on the CPU under the clock: the calls a user makes, nothing prepared beforehand.
 #include "contender_zkd.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include <zkd/build.hpp>
-#include <zkd/query.hpp>
+
+#include "memory.hpp"
 
 namespace zkd::bench {
+namespace {
 
-ZkdContender::ZkdContender(cpu::Executor executor, TriangleView triangles, BuildOptions options)
-    : executor_(executor), triangles_(triangles), options_(options) {}
+class CpuContender final : public ZkdContender {
+ public:
+  CpuContender(const cpu::Executor& executor, const TriangleView& triangles,
+               const BuildOptions& options)
+      : executor_(executor), triangles_(triangles), options_(options) {}
 
-std::vector<std::string> ZkdContender::names() const { return {"zkd"}; }
-
-double ZkdContender::build() {
-  clear();
-  const Stopwatch watch;
-  tree_ = zkd::build(executor_, triangles_, options_);
-  return watch.ms();
-}
-
-Contender::Timing ZkdContender::trace(std::size_t, RayKind kind, std::span<const Ray> rays) {
-  Timing timing;
-  if (kind == RayKind::shadow) {
-    occluded_.resize(rays.size());
+  double build() override {
+    clear();
     const Stopwatch watch;
-    any_hit(executor_, tree_.view(), triangles_, rays, occluded_);
+    tree_ = zkd::build(executor_, triangles_, options_);
+    return watch.ms();
+  }
+
+  Timing trace(std::size_t, RayKind kind, std::span<const Ray> rays) override {
+    Timing timing;
+    if (kind == RayKind::shadow) {
+      occluded_.resize(rays.size());
+      const Stopwatch watch;
+      zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded_);
+      timing.ms = watch.ms();
+      timing.hits = count_hits(occluded_);
+      return timing;
+    }
+    hits_.resize(rays.size());
+    const Stopwatch watch;
+    zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits_);
     timing.ms = watch.ms();
-    timing.hits =
-        static_cast<std::uint64_t>(std::count(occluded_.begin(), occluded_.end(), std::uint8_t{1}));
+    timing.hits = count_hits(hits_);
     return timing;
   }
-  hits_.resize(rays.size());
-  const Stopwatch watch;
-  closest_hit(executor_, tree_.view(), triangles_, rays, hits_);
-  timing.ms = watch.ms();
-  timing.hits = static_cast<std::uint64_t>(std::count_if(
-      hits_.begin(), hits_.end(), [](const Hit& hit) { return hit.triangle != no_triangle; }));
-  return timing;
-}
 
-void ZkdContender::clear() { tree_ = Tree(); }
+  void clear() override { tree_ = Tree(); }
+
+  // Bytes, in a build whose memory is counted. `once` can be asked for beforehand; for `all` the
+  // question is put with the number of references that it turned out to have.
+  void describe(Result& result) override {
+    CountingResource memory;
+    cpu::Executor counted = executor_;
+    counted.memory = &memory;
+    const Tree tree = zkd::build(counted, triangles_, options_);
+    result.allocated.tree = memory.held();
+    result.allocated.workspace = memory.peak() - memory.held();
+    const std::uint64_t references =
+        options_.references == References::once ? 0 : tree.view().reference_count();
+    const MemoryRequirement asked =
+        memory_requirement(counted, triangles_.triangle_count, options_, references);
+    result.allocated.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;
+    result.options = tree.options();
+    result.options.backend = Backend::cpu;  // an executor was given, so the option stays as asked
+  }
+
+  Samples stage_ms() override {
+    const auto& stages = tree_.statistics().stage_ms;
+    return {stages.begin(), stages.end()};
+  }
+
+  void measure_more(Result&, unsigned) override {}
+
+  void closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
+                   std::span<TraversalCost> costs) override {
+    zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits, costs);
+  }
+  void any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+               std::span<TraversalCost> costs) override {
+    zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded, costs);
+  }
+
+  const Tree& tree() override { return tree_; }
+
+ private:
+  cpu::Executor executor_;
+  TriangleView triangles_;
+  BuildOptions options_;
+  Tree tree_;
+  std::vector<Hit> hits_;
+  std::vector<std::uint8_t> occluded_;
+};
+
+}  // namespace
+
+std::unique_ptr<ZkdContender> cpu_contender(const cpu::Executor& executor,
+                                            const TriangleView& triangles,
+                                            const BuildOptions& options) {
+  return std::make_unique<CpuContender>(executor, triangles, options);
+}
 
 }  // namespace zkd::bench

@@ -1,36 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// zkd itself as a contender, on the CPU.
+// zkd itself as a contender, on either backend.
 #pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
 
 #include <zkd/cpu/executor.hpp>
 #include <zkd/options.hpp>
+#include <zkd/query.hpp>
 #include <zkd/tree.hpp>
 
 #include "contender.hpp"
 
 namespace zkd::bench {
 
-class ZkdContender final : public Contender {
+class ZkdContender : public Contender {
  public:
-  /// `triangles` must outlive it.
-  ZkdContender(cpu::Executor executor, TriangleView triangles, BuildOptions options);
+  [[nodiscard]] std::vector<std::string> names() const override { return {"zkd"}; }
 
-  [[nodiscard]] std::vector<std::string> names() const override;
-  double build() override;
-  Timing trace(std::size_t way, RayKind kind, std::span<const Ray> rays) override;
-  void clear() override;
+  /// What takes no clock, in builds of its own: options as used, memory, and on CUDA what the
+  /// device says of the tree. `result` has the counts and the hash of the CPU's tree already.
+  virtual void describe(Result& result) = 0;
 
-  /// What build() built last; empty before and after clear().
-  [[nodiscard]] const Tree& tree() const { return tree_; }
+  /// Milliseconds of each stage of the last build(), or, where looking at the clock between stages
+  /// would have made it longer, of one more like it.
+  [[nodiscard]] virtual Samples stage_ms() = 0;
 
- private:
-  cpu::Executor executor_;
-  TriangleView triangles_;
-  BuildOptions options_;
-  Tree tree_;
-  std::vector<Hit> hits_;
-  std::vector<std::uint8_t> occluded_;
+  /// Measures what only this backend has, `repeat` times each. After the interleaved repetitions.
+  virtual void measure_more(Result& result, unsigned repeat) = 0;
+
+  /// Answers of the tree that build() built last, as zkd/query.hpp has them; spans in host memory.
+  virtual void closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
+                           std::span<TraversalCost> costs = {}) = 0;
+  virtual void any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                       std::span<TraversalCost> costs = {}) = 0;
+
+  /// The tree that build() built last, in host memory. Valid until build() or clear().
+  [[nodiscard]] virtual const Tree& tree() = 0;
 };
+
+/// zkd on the CPU. `triangles` must outlive it.
+[[nodiscard]] std::unique_ptr<ZkdContender> cpu_contender(const cpu::Executor& executor,
+                                                          const TriangleView& triangles,
+                                                          const BuildOptions& options);
 
 }  // namespace zkd::bench

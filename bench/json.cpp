@@ -85,6 +85,7 @@ Json json_of_options(const Result& result) {
           {"axis_order", zkd::to_string(options.axis_order)},
           {"recode", options.recode_crowded},
           {"invalid", zkd::to_string(options.invalid_triangles)},
+          {"reference_capacity", options.reference_capacity},
           {"instructions", result.instructions},
           {"seed", result.seed}};
 }
@@ -95,6 +96,33 @@ Json json_of(const Peer& peer) {
       {"build_ms", json_of(peer.build_ms)},
       {"allocated_bytes", {{"held", or_null(peer.held_bytes)}, {"peak", or_null(peer.peak_bytes)}}},
       {"trace", json_of(peer.traces)}};
+}
+
+// Medians under the names of the contract; the spreads behind them apart.
+Json json_of(const Gpu& gpu) {
+  const auto median = [](const Spread& spread) {
+    return spread.n == 0 ? Json(nullptr) : Json(spread.median);
+  };
+  return {{"hash_equal", gpu.hash_equal},
+          {"hits_equal", gpu.hits_equal},
+          {"graph_replay_ms", median(gpu.graph_replay_ms)},
+          {"graph_replay_chained_ms", gpu.graph_replay_chained_ms},
+          {"graph_nodes", gpu.graph_nodes},
+          {"cold_ms", or_null(gpu.cold_ms)},
+          {"context_ms", or_null(gpu.context_ms)},
+          {"h2d_ms", median(gpu.h2d_ms)},
+          {"h2d_pageable_ms", median(gpu.h2d_pageable_ms)},
+          {"d2h_ms", median(gpu.d2h_ms)},
+          {"build_allocating_ms", median(gpu.build_allocating_ms)},
+          {"submit_ms", median(gpu.submit_ms)},
+          {"analyse_ms", or_null(gpu.analyse_ms)},
+          {"spread",
+           {{"graph_replay_ms", json_of(gpu.graph_replay_ms)},
+            {"h2d_ms", json_of(gpu.h2d_ms)},
+            {"h2d_pageable_ms", json_of(gpu.h2d_pageable_ms)},
+            {"d2h_ms", json_of(gpu.d2h_ms)},
+            {"build_allocating_ms", json_of(gpu.build_allocating_ms)},
+            {"submit_ms", json_of(gpu.submit_ms)}}}};
 }
 
 Json json_of(const Result& result) {
@@ -135,6 +163,7 @@ Json json_of(const Result& result) {
       {"crowded_triangles", statistics.crowded_triangles},
       {"hash", result.tree_hash}};
   json["trace"] = json_of(result.traces);
+  if (result.gpu) json["gpu"] = json_of(*result.gpu);
 
   Json& check = json["check"] = nullptr;
   if (result.check) {
@@ -169,11 +198,19 @@ std::string to_json(const Machine& machine, const std::vector<Result>& results) 
                  {"threads", machine.threads},
                  {"gpu", or_null(machine.gpu)},
                  {"driver", or_null(machine.driver)},
+                 {"cuda", or_null(machine.cuda)},
+                 {"compute_capability", or_null(machine.compute_capability)},
+                 {"multiprocessors", or_null(machine.multiprocessors)},
+                 {"gpu_memory_bytes", or_null(machine.gpu_memory_bytes)},
                  {"compiler", or_null(machine.compiler)}}}};
   Json& list = json["results"] = Json::array();
   for (const Result& result : results) list.push_back(json_of(result));
   // A path may hold bytes that are no UTF-8: they are replaced, not refused.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string to_json(const ColdBuild& cold) {
+  return Json{{"context_ms", cold.context_ms}, {"cold_ms", cold.build_ms}}.dump() + "\n";
 }
 
 }  // namespace zkd::bench

@@ -12,14 +12,16 @@
 #include <new>
 #include <string>
 
-#include <zkd/build.hpp>
 #include <zkd/error.hpp>
 
+#include "contender.hpp"
+#include "cuda.hpp"
 #include "json.hpp"
 #include "machine.hpp"
 #include "options.hpp"
 #include "run.hpp"
 #include "scene/catalog.hpp"
+#include "scene/image.hpp"
 #include "scene/load.hpp"
 #include "table.hpp"
 
@@ -35,15 +37,32 @@ int fail(ExitStatus status, std::string message) {
 }
 
 ExitStatus status_of(ErrorCode code) {
-  return code == ErrorCode::out_of_memory || code == ErrorCode::backend_unavailable ? device_failure
-                                                                                    : bad_input;
+  switch (code) {
+    case ErrorCode::out_of_memory:
+    case ErrorCode::backend_unavailable:
+    case ErrorCode::device_failure:
+      return device_failure;
+    default:
+      return bad_input;
+  }
 }
 
-// Asks the library, which knows what is linked and whether a device answers.
-Backend resolve(Backend wanted) {
-  BuildOptions options;
-  options.backend = wanted;
-  return build(TriangleView{}, options).options().backend;
+// Where zkd builds, and why not on CUDA if that was asked for.
+struct Where {
+  Backend backend = Backend::cpu;
+  std::string why_not_cuda;
+};
+
+Where resolve(Backend wanted) {
+  if (wanted == Backend::cpu) return {};
+  Where where;
+  where.why_not_cuda = why_no_cuda();
+  if (where.why_not_cuda.empty()) {
+    where.backend = Backend::cuda;
+  } else if (wanted == Backend::cuda) {
+    throw Error(ErrorCode::backend_unavailable, 0, "--backend cuda: " + where.why_not_cuda);
+  }
+  return where;
 }
 
 std::vector<scene::SceneInfo> find_scenes(const Options& options) {
@@ -61,15 +80,6 @@ std::vector<scene::SceneInfo> find_scenes(const Options& options) {
   return scenes;
 }
 
-// Opens the file before anything is measured, so that a bad path costs no minutes.
-std::ofstream open_json(const Options& options) {
-  std::ofstream file;
-  if (!options.json || *options.json == "-") return file;
-  file.open(*options.json);
-  if (!file) throw UsageError("--json: cannot write " + options.json->string());
-  return file;
-}
-
 void make_image_folder(const Options& options) {
   if (!options.images) return;
   std::error_code error;
@@ -79,41 +89,73 @@ void make_image_folder(const Options& options) {
   }
 }
 
+// --cold: what another zkd-bench asks for.
+int run_cold(const Options& options) {
+  const scene::SceneInfo info = scene::find_scene(options.scenes.front());
+  const scene::Mesh mesh = scene::load_mesh(info.path);
+  const ColdBuild cold = time_cold_build(mesh.view(), options.settings.front());
+  std::cout << to_json(cold) << std::flush;
+  return done;
+}
+
+// Rewritten after each scene, so that what was measured is kept if a later one fails.
+void write_json(const std::filesystem::path& path, const Machine& machine,
+                const std::vector<Result>& results) {
+  std::ofstream file(path, std::ios::trunc);
+  file << to_json(machine, results) << std::flush;
+  if (!file) throw UsageError("--json: cannot write " + path.string());
+}
+
+bool failed(const Result& result) {
+  return (result.check && result.check->outside.total() > 0) ||
+         (result.gpu && !(result.gpu->hash_equal && result.gpu->hits_equal));
+}
+
 int run(const Options& options) {
   if (options.list) {
     print_scenes(std::cout, scene::list_scenes(), scene::known_scenes());
     return done;
   }
+  if (options.cold) return run_cold(options);
 
+  const Stopwatch watch;
   const std::vector<scene::SceneInfo> scenes = find_scenes(options);
-  const Backend backend = resolve(options.settings.front().backend);
-  std::ofstream json_file = open_json(options);
+  const Where where = resolve(options.settings.front().backend);
+  if (options.images && !scene::can_write_png()) {
+    throw UsageError("--images: this zkd-bench was built without OpenImageIO");
+  }
+  const bool json_only = options.json && *options.json == "-";
   make_image_folder(options);
 
   cpu::Executor executor;
   executor.threads = options.threads > 0 ? options.threads : omp_get_max_threads();
   executor.instructions = options.instructions;
-  const Machine machine = describe_machine(executor.threads);
-
-  const bool json_only = options.json && *options.json == "-";
-  if (!json_only) print_header(std::cout, options, machine, backend);
+  Machine machine = describe_machine(executor.threads);
+  if (where.backend == Backend::cuda) describe_device(machine);
 
   std::vector<Result> results;
+  // Before anything is measured, so that a bad path costs no minutes.
+  if (options.json && !json_only) write_json(*options.json, machine, results);
+  if (!json_only) print_header(std::cout, options, machine, where.backend, where.why_not_cuda);
+
   for (const scene::SceneInfo& info : scenes) {
-    std::vector<Result> of_scene = run_scene(info, options, executor);
+    if (options.time_limit > 0 && watch.ms() > 1000.0 * options.time_limit) {
+      std::cerr << "zkd-bench: note: " << info.name << " is left out: --time-limit is reached"
+                << std::endl;
+      continue;
+    }
+    std::vector<Result> of_scene = run_scene(info, options, where.backend, executor);
     std::move(of_scene.begin(), of_scene.end(), std::back_inserter(results));
+    if (options.json && !json_only) write_json(*options.json, machine, results);
   }
 
-  if (!json_only) print_results(std::cout, options, results);
-  if (options.json) {
-    std::ostream& out = json_only ? static_cast<std::ostream&>(std::cout) : json_file;
-    out << to_json(machine, results) << std::flush;
-    if (!out) throw UsageError("--json: cannot write " + options.json->string());
+  if (json_only) {
+    std::cout << to_json(machine, results) << std::flush;
+    if (!std::cout) throw UsageError("--json: cannot write to standard output");
+  } else {
+    print_results(std::cout, options, results);
   }
-  const bool failed = std::any_of(results.begin(), results.end(), [](const Result& result) {
-    return result.check && result.check->outside.total() > 0;
-  });
-  return failed ? check_failed : done;
+  return std::any_of(results.begin(), results.end(), failed) ? check_failed : done;
 }
 
 }  // namespace

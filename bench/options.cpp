@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include <zkd/config.hpp>
+#include <zkd/geometry.hpp>
 
 namespace zkd::bench {
 namespace {
@@ -68,6 +69,8 @@ std::vector<Enum> values_listed(const std::array<Enum, N>& values, const std::st
   }
 }
 
+const char* on_off(bool value) { return value ? "on" : "off"; }
+
 bool on_or_off(const std::string& option, const std::string& value) {
   if (value == "on") return true;
   if (value == "off") return false;
@@ -111,6 +114,29 @@ const char* to_string(cpu::InstructionSet value) noexcept {
   return "auto";
 }
 
+std::vector<std::string> flags_of(const BuildOptions& options) {
+  return {"--builder",
+          zkd::to_string(options.builder),
+          "--quality",
+          zkd::to_string(options.quality),
+          "--references",
+          zkd::to_string(options.references),
+          "--budget",
+          std::to_string(options.budget),
+          "--leaf-size",
+          std::to_string(options.leaf_size),
+          "--code-bits",
+          std::to_string(options.code_bits),
+          "--axis-order",
+          zkd::to_string(options.axis_order),
+          "--recode",
+          on_off(options.recode_crowded),
+          "--invalid",
+          zkd::to_string(options.invalid_triangles),
+          "--reference-capacity",
+          std::to_string(options.reference_capacity)};
+}
+
 std::optional<Options> parse_options(int argc, const char* const* argv) {
   const BuildOptions defaults;
   Options options;
@@ -121,7 +147,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   std::string references = zkd::to_string(defaults.references);
   std::string axis_order = zkd::to_string(defaults.axis_order);
   std::string invalid = zkd::to_string(defaults.invalid_triangles);
-  std::string recode = defaults.recode_crowded ? "on" : "off";
+  std::string recode = on_off(defaults.recode_crowded);
   std::string measure_quality = "on";
   std::string instructions = bench::to_string(options.instructions);
   std::string rays = names_of(all_ray_kinds, ",");
@@ -134,6 +160,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   std::int64_t repeat = options.repeat;
   std::int64_t check = 0;
   std::int64_t seed = 1;
+  std::int64_t reference_capacity = 0;
+  std::int64_t time_limit = 0;
   std::string json;
   std::string images;
 
@@ -185,6 +213,9 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   text(build, "--recode", recode, "Code crowded trunks again: on, off", "ON|OFF");
   text(build, "--invalid", invalid, "NaN and infinite vertices: " + names_of(all_invalid, ", "),
        "WHAT");
+  number(build, "--reference-capacity", reference_capacity,
+         "On CUDA, references that `all` has room for; 0: as many as it needs", 0,
+         std::int64_t{max_count});
   text(build, "--measure-quality", measure_quality,
        "Depth and SAH cost, in a build of its own: on, off", "ON|OFF");
   text(build, "--instructions", instructions, names_of(all_instructions, ", "), "SET");
@@ -200,6 +231,12 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
       ->type_name("LIST");
   number(measure, "--check", check, "Rays of each kind against the exact oracle; 0: none", 0,
          20000000);
+
+  number(measure, "--time-limit", time_limit, "Seconds after which no scene is begun; 0: none", 0,
+         1000000);
+  app.add_flag("--cold", options.cold,
+               "Time one CUDA build in this new process, print it as JSON and exit")
+      ->group(measure);
 
   const char* report = "Report";
   app.add_option("--json", json, "Write results; `-`: standard output, and no table")
@@ -220,6 +257,9 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
     throw UsageError(one_line(error.what()));
   }
 
+  if (options.cold && options.scenes.size() != 1) {
+    throw UsageError("--cold: needs one SCENE");
+  }
   if (!std::isfinite(budget) || budget < 1.0) {
     throw UsageError("--budget: '" + std::to_string(budget) + "' is not a number of at least 1");
   }
@@ -230,6 +270,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   base.leaf_size = static_cast<std::uint32_t>(leaf_size);
   base.code_bits = static_cast<std::uint32_t>(code_bits);
   base.axis_order = value_named(all_axis_orders, "--axis-order", axis_order);
+  base.reference_capacity = static_cast<std::uint64_t>(reference_capacity);
   base.recode_crowded = on_or_off("--recode", recode);
   base.invalid_triangles = value_named(all_invalid, "--invalid", invalid);
 
@@ -259,6 +300,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   options.seed = static_cast<std::uint64_t>(seed);
   options.repeat = static_cast<unsigned>(repeat);
   options.check = static_cast<std::uint64_t>(check);
+  options.time_limit = static_cast<unsigned>(time_limit);
   if (app.count("--peers") > 0) options.peers = values_listed(all_peers, "--peers", peers);
   if (app.count("--json") > 0) options.json = json;
   if (app.count("--images") > 0) options.images = images;

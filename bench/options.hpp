@@ -46,6 +46,8 @@ struct Options {
 
   std::vector<PeerLibrary> peers;
   std::uint64_t check = 0;  ///< rays of each kind; 0: no check
+  bool cold = false;        ///< time one build in this process, print it as JSON, and nothing else
+  unsigned time_limit = 0;  ///< seconds after which no further scene is begun; 0: none
 
   std::optional<std::filesystem::path> json;  ///< "-": standard output, and no table
   std::optional<std::filesystem::path> images;
@@ -54,6 +56,9 @@ struct Options {
 
 /// "auto", "portable" or "avx2". Static storage.
 [[nodiscard]] const char* to_string(cpu::InstructionSet value) noexcept;
+
+/// The flags that give these build options on a command line (--backend aside).
+[[nodiscard]] std::vector<std::string> flags_of(const BuildOptions& options);
 
 /// Reads the command line. --help and --version print to standard output and return nothing: the
 /// program is done.

@@ -78,6 +78,31 @@ struct Peer {
   Traces traces;
 };
 
+/// What only builds on a CUDA device have, besides: milliseconds by the device's clock unless said
+/// otherwise. The triangles are in device memory beforehand, except where their way is what is
+/// timed. Result::build_ms is rebuild() with the caller's workspace on a stream that is idle.
+struct Gpu {
+  /// The tree of build() and, into memory overwritten before, that of a replayed graph have the
+  /// hash of the CPU's tree of this run.
+  bool hash_equal = false;
+  /// Every ray of the workload has the CPU's answer, bit for bit.
+  bool hits_equal = false;
+
+  Spread graph_replay_ms;  ///< rebuild() captured in a graph, one replay on an idle stream
+  double graph_replay_chained_ms{};  ///< many replays one behind the other: time of one
+  std::uint64_t graph_nodes = 0;     ///< kernels, copies and fills in that graph
+  Spread submit_ms;                  ///< the host's time for one rebuild(), by its own clock
+  Spread build_allocating_ms;        ///< build() with tree and workspace from the default pool
+  Spread h2d_ms;                     ///< the triangles from pinned host memory
+  Spread h2d_pageable_ms;            ///< from ordinary host memory, by the host's clock
+  Spread d2h_ms;                     ///< Tree::to_host(), by the host's clock
+  std::optional<double> analyse_ms;  ///< analyse() for `all`, by the host's clock
+  /// The first build of a process of its own, by the host's clock: kernels are loaded and pools
+  /// made on the way. The context is there, and what that took is told apart.
+  std::optional<double> cold_ms;
+  std::optional<double> context_ms;
+};
+
 /// One scene with one set of options.
 struct Result {
   std::string scene;
@@ -99,6 +124,7 @@ struct Result {
   bool has_quality = false;  ///< depth and SAH cost in `statistics` were measured
   std::string tree_hash;
   Traces traces;
+  std::optional<Gpu> gpu;           ///< CUDA only
   std::map<RayKind, Check> checks;  ///< empty without --check
   std::optional<Check> check;       ///< all kinds together
   std::vector<Peer> peers;
@@ -116,6 +142,10 @@ struct Machine {
   int threads = 0;
   std::optional<std::string> gpu;
   std::optional<std::string> driver;
+  std::optional<std::string> cuda;                ///< of the runtime, `13.0`
+  std::optional<std::string> compute_capability;  ///< `9.0`
+  std::optional<std::uint64_t> multiprocessors;
+  std::optional<std::uint64_t> gpu_memory_bytes;
   std::optional<std::string> compiler;
   std::optional<std::string> commit;
 };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstring>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,9 +18,10 @@
 #include <zkd/query.hpp>
 
 #include "check.hpp"
+#include "cold_start.hpp"
 #include "contender_zkd.hpp"
+#include "cuda.hpp"
 #include "images.hpp"
-#include "memory.hpp"
 #include "peers_embree.hpp"
 #include "rays.hpp"
 #include "scene/load.hpp"
@@ -28,17 +30,6 @@
 
 namespace zkd::bench {
 namespace {
-
-using Samples = std::vector<double>;
-
-Spread spread_of(Samples samples) {
-  if (samples.empty()) return {};
-  std::sort(samples.begin(), samples.end());
-  const std::size_t middle = samples.size() / 2;
-  const double median =
-      samples.size() % 2 == 1 ? samples[middle] : 0.5 * (samples[middle - 1] + samples[middle]);
-  return {median, samples.front(), samples.back(), samples.size()};
-}
 
 // Worker threads of OpenMP and of TBB spin for a while after their work and would take the cores
 // from whoever is timed next.
@@ -102,8 +93,8 @@ void repeat_once(Entrant& entrant, const Workload& workload, bool keep) {
   let_workers_sleep();
   const double build_ms = contender.build();
   if (keep) entrant.build_ms.push_back(build_ms);
-  if (const auto* ours = dynamic_cast<const ZkdContender*>(&contender); ours != nullptr && keep) {
-    const auto& stage_ms = ours->tree().statistics().stage_ms;
+  if (auto* const ours = dynamic_cast<ZkdContender*>(&contender); ours != nullptr && keep) {
+    const Samples stage_ms = ours->stage_ms();
     entrant.stages_ms.resize(stage_ms.size());
     for (std::size_t stage = 0; stage < stage_ms.size(); ++stage) {
       entrant.stages_ms[stage].push_back(stage_ms[stage]);
@@ -132,17 +123,16 @@ Traces traces_of(const std::map<RayKind, Entrant::Kind>& seen, const Workload& w
   return traces;
 }
 
-void measure_traversal(Result& result, const Workload& workload, const TriangleView& triangles,
-                       const Tree& tree, const cpu::Executor& executor) {
+void measure_traversal(Result& result, const Workload& workload, ZkdContender& contender) {
   for (const auto& [kind, rays] : workload.rays) {
     if (rays.empty()) continue;
     std::vector<TraversalCost> costs(rays.size());
     if (kind == RayKind::shadow) {
       std::vector<std::uint8_t> occluded(rays.size());
-      any_hit(executor, tree.view(), triangles, rays, occluded, costs);
+      contender.any_hit(rays, occluded, costs);
     } else {
       std::vector<Hit> hits(rays.size());
-      closest_hit(executor, tree.view(), triangles, rays, hits, costs);
+      contender.closest_hit(rays, hits, costs);
     }
     std::uint64_t node_visits = 0;
     std::uint64_t triangle_tests = 0;
@@ -156,26 +146,31 @@ void measure_traversal(Result& result, const Workload& workload, const TriangleV
   }
 }
 
-// Bytes, in a build whose memory is counted. `once` can be asked for beforehand; for `all` the
-// question is put with the number of references that it turned out to have.
-AllocatedBytes measure_memory(const cpu::Executor& executor, const TriangleView& triangles,
-                              const BuildOptions& options) {
-  CountingResource memory;
-  cpu::Executor counted = executor;
-  counted.memory = &memory;
-  AllocatedBytes bytes;
-  const Tree tree = zkd::build(counted, triangles, options);
-  bytes.tree = memory.held();
-  bytes.workspace = memory.peak() - memory.held();
-  const std::uint64_t references =
-      options.references == References::once ? 0 : tree.view().reference_count();
-  const MemoryRequirement asked =
-      memory_requirement(counted, triangles.triangle_count, options, references);
-  bytes.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;
-  return bytes;
+// Whether the contender's answers have the bits of the CPU's.
+bool answers_equal(const Workload& workload, const TriangleView& triangles, const Tree& tree,
+                   const cpu::Executor& executor, ZkdContender& contender) {
+  const auto same = [](const auto& a, const auto& b) {
+    return std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
+  };
+  for (const auto& [kind, rays] : workload.rays) {
+    if (kind == RayKind::shadow) {
+      std::vector<std::uint8_t> expected(rays.size());
+      std::vector<std::uint8_t> seen(rays.size());
+      any_hit(executor, tree.view(), triangles, rays, expected);
+      contender.any_hit(rays, seen);
+      if (!rays.empty() && !same(expected, seen)) return false;
+    } else {
+      std::vector<Hit> expected(rays.size());
+      std::vector<Hit> seen(rays.size());
+      closest_hit(executor, tree.view(), triangles, rays, expected);
+      contender.closest_hit(rays, seen);
+      if (!rays.empty() && !same(expected, seen)) return false;
+    }
+  }
+  return true;
 }
 
-// Facts that take no clock: memory, counts, quality, the tree's hash.
+// Facts that take no clock, from the CPU's tree: what every backend has to make.
 Result describe(const scene::SceneInfo& info, const scene::Mesh& mesh, const Options& options,
                 std::size_t setting, const cpu::Executor& executor, Tree& tree) {
   Result result;
@@ -192,15 +187,23 @@ Result describe(const scene::SceneInfo& info, const scene::Mesh& mesh, const Opt
   result.seed = options.seed;
 
   BuildOptions build = options.settings[setting];
-  result.allocated = measure_memory(executor, mesh.view(), build);
   build.measure_quality = options.measure_quality;
   tree = zkd::build(executor, mesh.view(), build);
   result.has_quality = options.measure_quality;
   result.statistics = tree.statistics();
-  result.options = tree.options();
-  result.options.backend = Backend::cpu;  // an executor was given, so the option stays as asked
   result.tree_hash = verify::tree_hash(tree.view());
   return result;
+}
+
+std::vector<std::unique_ptr<ZkdContender>> our_contenders(const Options& options, Backend backend,
+                                                          const TriangleView& triangles,
+                                                          const cpu::Executor& executor) {
+  if (backend == Backend::cuda) return cuda_contenders(triangles, options.settings);
+  std::vector<std::unique_ptr<ZkdContender>> contenders;
+  for (const BuildOptions& setting : options.settings) {
+    contenders.push_back(cpu_contender(executor, triangles, setting));
+  }
+  return contenders;
 }
 
 // `bunny`, or `bunny-all` for the later of several settings.
@@ -213,25 +216,38 @@ std::string image_name(const Result& result, std::size_t setting) {
 
 }  // namespace
 
-std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& options,
+std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& options, Backend backend,
                               const cpu::Executor& executor) {
   const scene::Mesh mesh = scene::load_mesh(info.path);
   const TriangleView triangles = mesh.view();
   const scene::Camera camera = info.camera ? *info.camera : scene::fit_camera(scene::bounds(mesh));
 
-  std::vector<Result> results;
-  std::vector<std::unique_ptr<ZkdContender>> ours;
-  Workload workload;
-  for (std::size_t setting = 0; setting < options.settings.size(); ++setting) {
-    Tree tree;
-    results.push_back(describe(info, mesh, options, setting, executor, tree));
-    if (setting == 0) workload = make_workload(options, camera, triangles, tree, executor);
-    measure_traversal(results.back(), workload, triangles, tree, executor);
-    ours.push_back(std::make_unique<ZkdContender>(executor, triangles, options.settings[setting]));
-  }
-
+  std::unique_ptr<Checker> checker;
+  if (options.check > 0) checker = make_checker(mesh, camera, options, executor.threads);
   std::vector<std::unique_ptr<EmbreeContender>> peers;
   if (!options.peers.empty()) peers = embree_contenders(mesh, executor.threads);
+
+  std::vector<Result> results;
+  const auto ours = our_contenders(options, backend, triangles, executor);
+  Workload workload;
+  for (std::size_t setting = 0; setting < ours.size(); ++setting) {
+    Tree tree;
+    Result result = describe(info, mesh, options, setting, executor, tree);
+    ZkdContender& contender = *ours[setting];
+    contender.describe(result);
+    if (setting == 0) workload = make_workload(options, camera, triangles, tree, executor);
+    contender.build();
+    measure_traversal(result, workload, contender);
+    if (result.gpu) {
+      result.gpu->hits_equal = answers_equal(workload, triangles, tree, executor, contender);
+      if (const auto cold = cold_build_elsewhere(info.path, result.options)) {
+        result.gpu->context_ms = cold->context_ms;
+        result.gpu->cold_ms = cold->build_ms;
+      }
+    }
+    contender.clear();
+    results.push_back(std::move(result));
+  }
 
   std::vector<Entrant> entrants;
   for (const auto& contender : ours) entrants.emplace_back(*contender);
@@ -268,16 +284,6 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
   }
   peers.clear();
 
-  std::optional<verify::Oracle> oracle;
-  if (options.check > 0) {
-    // A loop over all triangles is the oracle's choice for small meshes; with many rays it is long.
-    const bool many =
-        static_cast<double>(options.check) * static_cast<double>(triangles.triangle_count) > 1e8;
-    oracle.emplace(triangles,
-                   many ? verify::Oracle::Search::box_tree : verify::Oracle::Search::automatic);
-  }
-  const bool closed = options.check > 0 && is_closed(mesh);
-
   for (std::size_t setting = 0; setting < results.size(); ++setting) {
     Result& result = results[setting];
     const Entrant& entrant = entrants[setting];
@@ -292,21 +298,16 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
     result.peers = timed_peers;
     result.preempted_per_s = preempted_per_s;
 
-    if (!oracle && !options.images) continue;
-    ours[setting]->build();
-    const Tree& tree = ours[setting]->tree();
-    if (oracle) {
-      const CheckedScene checked{mesh,         *oracle,       camera,      options.rays,
-                                 options.size, options.check, options.seed};
-      result.checks = check_tree(checked, tree, executor);
-      result.check = all_kinds(result.checks);
-      if (closed) result.check->leaks = count_leaks(checked, tree, executor);
-    }
+    ZkdContender& contender = *ours[setting];
+    contender.measure_more(result, options.repeat);
+    if (!checker && !options.images) continue;
+    contender.build();
+    if (checker) checker->check(contender, result);
     if (options.images) {
       result.visits_at_white = write_images(*options.images, image_name(result, setting), triangles,
-                                            tree, camera, options.size, executor);
+                                            contender.tree(), camera, options.size, executor);
     }
-    ours[setting]->clear();
+    contender.clear();
   }
   return results;
 }

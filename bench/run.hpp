@@ -19,9 +19,12 @@ namespace zkd::bench {
 /// after one warm-up of each. Memory, tree quality, traversal cost and the check are measured in
 /// builds of their own, outside of the times. Writes images if asked to.
 ///
+/// `backend` (cpu or cuda) is where zkd builds and traces. On CUDA the CPU builds and traces too,
+/// outside of the times, to be compared with. Pictures are drawn by the CPU, through the same tree.
+///
 /// Throws scene::LoadError, UsageError, Error, and std::runtime_error for images that cannot be
 /// written.
 [[nodiscard]] std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& options,
-                                            const cpu::Executor& executor);
+                                            Backend backend, const cpu::Executor& executor);
 
 }  // namespace zkd::bench

@@ -34,6 +34,13 @@ std::string number(std::optional<double> value) {
   return text;
 }
 
+// The same with one digit more below 10: a build on a GPU takes fractions of a millisecond.
+std::string fine(double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", value < 9.995 ? 3 : value < 99.95 ? 1 : 0, value);
+  return text;
+}
+
 std::string count(std::uint64_t value) { return std::to_string(value); }
 
 std::string megabytes(std::uint64_t bytes) { return number(static_cast<double>(bytes) / 1e6); }
@@ -170,6 +177,40 @@ void print_spread(std::ostream& out, const std::vector<Result>& results) {
       cells.push_back({20, trace == nullptr ? "-" : spread(trace->ms)});
     }
     print_row(out, label_of(result), cells);
+  }
+}
+
+// What a build takes on the device, by the way it is asked for, and what its data takes there.
+void print_gpu(std::ostream& out, const std::vector<Result>& results) {
+  out << "\nCUDA, milliseconds (medians). rebuild and graph: no allocation. chained: replays one "
+         "behind the\nother. host: until the call returns. cold: first build of a process\n";
+  print_row(out, "",
+            {{8, ""}, {8, "graph"}, {8, "graph"}, {8, "rebuild"}, {8, "build w."}, {8, ""}});
+  print_row(out, "scene",
+            {{8, "rebuild"},
+             {8, "replay"},
+             {8, "chained"},
+             {8, "host"},
+             {8, "alloc."},
+             {8, "cold"},
+             {7, "H2D"},
+             {7, "D2H"},
+             {6, "hash"},
+             {6, "hits"}});
+  for (const Result& result : results) {
+    if (!result.gpu) continue;
+    const Gpu& gpu = *result.gpu;
+    print_row(out, label_of(result),
+              {{8, fine(result.build_ms.median)},
+               {8, fine(gpu.graph_replay_ms.median)},
+               {8, fine(gpu.graph_replay_chained_ms)},
+               {8, fine(gpu.submit_ms.median)},
+               {8, fine(gpu.build_allocating_ms.median)},
+               {8, number(gpu.cold_ms)},
+               {7, fine(gpu.h2d_ms.median)},
+               {7, fine(gpu.d2h_ms.median)},
+               {6, gpu.hash_equal ? "equal" : "WRONG"},
+               {6, gpu.hits_equal ? "equal" : "WRONG"}});
   }
 }
 
@@ -349,9 +390,14 @@ void print_images(std::ostream& out, const Options& options, const std::vector<R
 }  // namespace
 
 void print_header(std::ostream& out, const Options& options, const Machine& machine,
-                  Backend backend) {
+                  Backend backend, const std::string& why_not_cuda) {
   out << "zkd-bench " ZKD_VERSION ", backend " << zkd::to_string(backend);
-  if (options.settings.front().backend == Backend::automatic) out << " (chosen by auto)";
+  if (options.settings.front().backend == Backend::automatic) {
+    out << " (chosen by auto" << (why_not_cuda.empty() ? "" : ": ") << why_not_cuda << ')';
+  }
+  if (machine.gpu) {
+    out << " on " << *machine.gpu << ", driver " << machine.driver.value_or("unknown");
+  }
   out << ", " << machine.threads << (machine.threads == 1 ? " thread" : " threads") << ", "
       << machine.cpu.value_or("unknown processor") << '\n';
   out << "times: medians of " << options.repeat << " interleaved repetitions after a warm-up, on "
@@ -363,6 +409,9 @@ void print_results(std::ostream& out, const Options& options, const std::vector<
   out << '\n';
   print_main_table(out, results);
   print_footnotes(out, results);
+  const bool gpu = std::any_of(results.begin(), results.end(),
+                               [](const Result& result) { return result.gpu.has_value(); });
+  if (gpu) print_gpu(out, results);
   print_spread(out, results);
   print_stages(out, results);
   print_skips(out, results);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <ostream>
+#include <string>
 #include <vector>
 
 #include "options.hpp"
@@ -12,9 +13,9 @@
 
 namespace zkd::bench {
 
-/// One line that says what runs and where. `backend` is the one chosen.
+/// What runs and where. `backend` is the one chosen; `why_not_cuda` says why auto chose the CPU.
 void print_header(std::ostream& out, const Options& options, const Machine& machine,
-                  Backend backend);
+                  Backend backend, const std::string& why_not_cuda);
 
 /// The paper's table and what belongs to it: spread, stages, skips, peers, check.
 void print_results(std::ostream& out, const Options& options, const std::vector<Result>& results);

@@ -10,6 +10,16 @@ install(TARGETS zkd EXPORT zkdTargets
         LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT zkd_runtime
                 NAMELINK_COMPONENT zkd_development
         RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT zkd_runtime)
+if(TARGET zkd_cuda)
+  # A set of its own: programs that do not ask for CUDA need not have it.
+  install(TARGETS zkd_cuda EXPORT zkdCudaTargets
+          ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT zkd_development
+          LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT zkd_runtime
+                  NAMELINK_COMPONENT zkd_development
+          RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT zkd_runtime)
+  install(EXPORT zkdCudaTargets NAMESPACE zkd:: DESTINATION "${zkd_package_dir}"
+          COMPONENT zkd_development)
+endif()
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/include/zkd" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
         COMPONENT zkd_development FILES_MATCHING PATTERN "*.hpp")
 install(EXPORT zkdTargets NAMESPACE zkd:: DESTINATION "${zkd_package_dir}"

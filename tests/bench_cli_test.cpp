@@ -87,6 +87,15 @@ class BenchCli : public testing::Test {
     EXPECT_NE(outcome.err.find(naming), std::string::npos) << outcome.err;
   }
 
+  // Whatever comes out: a wrong tree (status 1) is an answer too.
+  bool cuda_answers() const {
+    return run("tetra.obj --backend cuda" + std::string(quick)).status != 3;
+  }
+
+  bool can_check() const {
+    return run("tetra.obj --backend cpu --check 1" + std::string(quick)).status == 0;
+  }
+
   Json run_json(const std::string& arguments) const {
     const Outcome outcome = run(arguments + " --json -");
     EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -114,10 +123,11 @@ TEST_F(BenchCli, HelpVersionAndListSucceed) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.status, 0);
   for (const char* option :
-       {"--backend",   "--threads",   "--references", "--budget", "--builder", "--quality",
-        "--leaf-size", "--code-bits", "--axis-order", "--recode", "--invalid", "--instructions",
-        "--rays",      "--size",      "--repeat",     "--peers",  "--check",   "--json",
-        "--images",    "--list",      "--version",    "--seed"}) {
+       {"--backend", "--threads",      "--references", "--budget",     "--builder",
+        "--quality", "--leaf-size",    "--code-bits",  "--axis-order", "--recode",
+        "--invalid", "--instructions", "--rays",       "--size",       "--repeat",
+        "--peers",   "--check",        "--json",       "--images",     "--list",
+        "--version", "--seed",         "--cold",       "--time-limit", "--reference-capacity"}) {
     EXPECT_NE(help.out.find(option), std::string::npos) << option;
   }
   const Outcome version = run("--version");
@@ -145,8 +155,8 @@ TEST_F(BenchCli, BadUsageIsOneLineThatNamesTheOption) {
   expect_error("tetra.obj --instructions mmx", 2, "--instructions");
   expect_error("tetra.obj --budget 0.5", 2, "--budget");
   expect_error("tetra.obj --budget nan", 2, "--budget");
-  for (const char* option :
-       {"--threads", "--leaf-size", "--code-bits", "--size", "--repeat", "--check", "--seed"}) {
+  for (const char* option : {"--threads", "--leaf-size", "--code-bits", "--size", "--repeat",
+                             "--check", "--seed", "--reference-capacity", "--time-limit"}) {
     expect_error(std::string("tetra.obj ") + option + " -1", 2, option);
     expect_error(std::string("tetra.obj ") + option + " 1.5", 2, option);
     expect_error(std::string("tetra.obj ") + option + " x", 2, option);
@@ -154,6 +164,9 @@ TEST_F(BenchCli, BadUsageIsOneLineThatNamesTheOption) {
   }
   expect_error("tetra.obj --leaf-size 0", 2, "--leaf-size");
   expect_error("tetra.obj --code-bits 65", 2, "--code-bits");
+  expect_error("tetra.obj --reference-capacity 2147483648", 2, "--reference-capacity");
+  expect_error("--cold", 2, "--cold");
+  expect_error("tetra.obj tetra.obj --cold", 2, "--cold");
 }
 
 TEST_F(BenchCli, BadInputIsOneLineThatNamesTheFile) {
@@ -175,15 +188,74 @@ TEST_F(BenchCli, WhatThisVersionDoesNotBuildIsUsage) {
   expect_error("tetra.obj --quality high", 2, "high");
 }
 
+// What --backend cuda says here, if no CUDA device answers.
 TEST_F(BenchCli, CudaWithoutCudaIsADeviceFailure) {
-  const Outcome outcome = run("tetra.obj --backend cuda" + std::string(quick));
-  if (outcome.status == 0) GTEST_SKIP() << "a CUDA device answers here";
-  EXPECT_EQ(outcome.status, 3);
-  EXPECT_EQ(lines_of(outcome.err), 1u) << outcome.err;
-  EXPECT_TRUE(outcome.err.starts_with("zkd-bench: error: ")) << outcome.err;
+  for (const char* arguments : {"tetra.obj --backend cuda", "tetra.obj --cold"}) {
+    SCOPED_TRACE(arguments);
+    const Outcome outcome = run(arguments + std::string(quick));
+    if (outcome.status == 0) GTEST_SKIP() << "a CUDA device answers here";
+    EXPECT_EQ(outcome.status, 3);
+    EXPECT_EQ(lines_of(outcome.err), 1u) << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("zkd-bench: error: ")) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+  }
+}
+
+TEST_F(BenchCli, AutoFallsBackToTheCpuAndSaysWhy) {
+  if (cuda_answers()) GTEST_SKIP() << "a CUDA device answers here";
+  const Outcome outcome = run("tetra.obj --backend auto" + std::string(quick));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const std::string first = outcome.out.substr(0, outcome.out.find('\n'));
+  EXPECT_NE(first.find("backend cpu (chosen by auto: "), std::string::npos) << first;
+  const Outcome asked = run("tetra.obj --backend cpu" + std::string(quick));
+  EXPECT_EQ(asked.out.find("chosen by auto"), std::string::npos) << asked.out;
+}
+
+TEST_F(BenchCli, CudaResultsStandBesideTheCpusTree) {
+  if (!cuda_answers()) GTEST_SKIP() << "no CUDA device answers here";
+  const Json json = run_json("tetra.obj --backend cuda --references once,all" + std::string(quick));
+  EXPECT_TRUE(json["machine"]["gpu"].is_string());
+  EXPECT_TRUE(json["machine"]["driver"].is_string());
+  const Json of_cpu =
+      run_json("tetra.obj --backend cpu --references once,all" + std::string(quick));
+  ASSERT_EQ(json["results"].size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Json& result = json["results"][i];
+    EXPECT_EQ(result["backend"], "cuda");
+    EXPECT_EQ(result["tree"]["hash"], of_cpu["results"][i]["tree"]["hash"]);
+    const Json& gpu = result["gpu"];
+    expect_keys(gpu, {"hash_equal", "graph_replay_ms", "cold_ms", "h2d_ms", "hits_equal", "d2h_ms",
+                      "build_allocating_ms"});
+    EXPECT_EQ(gpu["hash_equal"], true);
+    EXPECT_EQ(gpu["hits_equal"], true);
+    for (const char* time : {"graph_replay_ms", "cold_ms", "h2d_ms", "d2h_ms"}) {
+      EXPECT_GT(gpu[time].get<double>(), 0.0) << time;
+    }
+  }
+}
+
+// What has been measured is on disk before the next scene is begun.
+TEST_F(BenchCli, ResultsAreKeptWhenALaterSceneFails) {
+  write(folder_ / "broken.obj", "v 0 0 0\nf 1 2 9\n");
+  const Outcome outcome = run("tetra.obj broken.obj --json out.json" + std::string(quick));
+  EXPECT_EQ(outcome.status, 2);
+  const Json json = Json::parse(contents(folder_ / "out.json"), nullptr, false);
+  ASSERT_TRUE(json.is_object());
+  ASSERT_EQ(json["results"].size(), 1u);
+  EXPECT_EQ(json["results"][0]["scene"], "tetra");
+}
+
+TEST_F(BenchCli, TimeLimitLeavesOutScenesAndSaysWhich) {
+  write(folder_ / "second.obj", tetrahedron);
+  const Outcome outcome =
+      run("tetra.obj second.obj --time-limit 1 --size 32 --repeat 100 --threads 2");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.err, "zkd-bench: note: second is left out: --time-limit is reached\n");
+  EXPECT_NE(outcome.out.find("tetra"), std::string::npos);
 }
 
 TEST_F(BenchCli, TableFitsAHundredColumnsAndStderrIsQuiet) {
+  if (!can_check()) GTEST_SKIP() << "built without GMP";
   const Outcome outcome = run("tetra.obj --references once,all --check 500" + std::string(quick));
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(outcome.err, "");
@@ -196,7 +268,9 @@ TEST_F(BenchCli, TableFitsAHundredColumnsAndStderrIsQuiet) {
 }
 
 TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
-  const Json json = run_json("tetra.obj --references once,all --check 500" + std::string(quick));
+  if (!can_check()) GTEST_SKIP() << "built without GMP";
+  const Json json =
+      run_json("tetra.obj --backend cpu --references once,all --check 500" + std::string(quick));
   expect_keys(json, {"schema", "zkd", "commit", "machine", "results"});
   EXPECT_EQ(json["schema"], 1);
   expect_keys(json["machine"], {"cpu", "threads", "gpu", "driver", "compiler"});
@@ -213,10 +287,11 @@ TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
     EXPECT_EQ(result["stand_in"], false);
     EXPECT_EQ(result["skipped_triangles"], 0);
     EXPECT_EQ(result["backend"], "cpu");
+    EXPECT_FALSE(result.contains("gpu"));
     EXPECT_EQ(result["threads"], 2);
     expect_keys(result["options"],
                 {"builder", "quality", "references", "budget", "leaf_size", "code_bits",
-                 "axis_order", "recode", "invalid", "instructions", "seed"});
+                 "axis_order", "recode", "invalid", "reference_capacity", "instructions", "seed"});
     expect_spread(result["build_ms"], 2);
     expect_keys(result["stages_ms"], {"validate", "encode", "sort", "references", "tight_boxes"});
     expect_keys(result["allocated_bytes"], {"tree", "workspace", "asked_beforehand"});
@@ -253,6 +328,7 @@ TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
 }
 
 TEST_F(BenchCli, RaysNotAskedForAreNull) {
+  if (!can_check()) GTEST_SKIP() << "built without GMP";
   const Json json = run_json("tetra.obj --rays diffuse --check 100" + std::string(quick));
   const Json& trace = json["results"][0]["trace"];
   EXPECT_TRUE(trace["primary"].is_null());
@@ -262,6 +338,7 @@ TEST_F(BenchCli, RaysNotAskedForAreNull) {
 }
 
 TEST_F(BenchCli, OpenMeshHasNoLeaksToCount) {
+  if (!can_check()) GTEST_SKIP() << "built without GMP";
   write(folder_ / "open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const Json json = run_json("open.obj --check 100" + std::string(quick));
   EXPECT_TRUE(json["results"][0]["check"]["leaks"].is_null());
@@ -293,6 +370,11 @@ TEST_F(BenchCli, SameTreeAndSameRaysOnAnyNumberOfThreads) {
 
 TEST_F(BenchCli, WorksFromAnyFolderAndWritesWhereAsked) {
   fs::create_directory(folder_ / "elsewhere");
+  const Outcome no_images = run("tetra.obj --images images" + std::string(quick));
+  if (no_images.err.find("without OpenImageIO") != std::string::npos) {
+    EXPECT_EQ(no_images.status, 2);
+    GTEST_SKIP() << no_images.err;
+  }
   const Outcome outcome =
       run("'" + (folder_ / "tetra.obj").string() + "' --json '" +
               (folder_ / "elsewhere/out.json").string() + "' --images elsewhere/images" + quick,

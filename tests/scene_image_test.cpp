@@ -14,7 +14,13 @@ namespace {
 
 using glm::vec3;
 
-class ImageTest : public SceneFiles {};
+class ImageTest : public SceneFiles {
+ protected:
+  void SetUp() override {
+    SceneFiles::SetUp();
+    if (!scene::can_write_png()) GTEST_SKIP() << "built without OpenImageIO, which writes PNG";
+  }
+};
 
 TEST_F(ImageTest, WritesAPng) {
   const auto file = folder_ / "new" / "a.png";

@@ -80,6 +80,7 @@ TEST_F(PlyTest, BinaryAfterAHeaderWithCrLf) {
 
 // A carriage return inside a row is a blank to one reader and the end of the row to the other.
 TEST_F(PlyTest, ReadersThatDisagreeAreNotTrusted) {
+  if (!scene::can_read_gltf()) GTEST_SKIP() << "built without Assimp: there is no second reader";
   expect_error("a.ply", header("ascii", 3, 1) + "0 0\r0\n1 0 0\n1 1 0\n3 0 1 2\n",
                ": Assimp and zkd read vertex 1 differently; the file is not trusted");
 }

@@ -11,7 +11,15 @@ namespace {
 using glm::uvec3;
 using glm::vec3;
 using StlTest = SceneFiles;
-using GltfTest = SceneFiles;
+
+class GltfTest : public SceneFiles {
+ protected:
+  void SetUp() override {
+    SceneFiles::SetUp();
+    if (!scene::can_read_gltf()) GTEST_SKIP() << "built without Assimp, which reads glTF";
+  }
+};
+using GltfWithoutAssimpTest = SceneFiles;
 
 // ---- STL ----------------------------------------------------------------------------------------
 
@@ -273,6 +281,13 @@ TEST_F(GltfTest, EveryTruncationIsAnError) {
   for (std::size_t length = 0; length < text.size(); ++length) {
     EXPECT_THROW(load("a.glb", text.substr(0, length)), scene::LoadError) << length;
   }
+}
+
+TEST_F(GltfWithoutAssimpTest, IsOneClearError) {
+  if (scene::can_read_gltf()) GTEST_SKIP() << "built with Assimp";
+  expect_error("a.gltf", "{}",
+               ": glTF is read by Assimp, which this program was built without "
+               "(Debian and Ubuntu: libassimp-dev)");
 }
 
 }  // namespace

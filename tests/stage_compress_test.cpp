@@ -13,6 +13,7 @@
 
 #include "support/keys.hpp"
 #include "support/plain_stages.hpp"
+#include "support/platform.hpp"
 
 namespace zkd {
 namespace {
@@ -22,15 +23,15 @@ struct Compressed {
   std::vector<Link> children;
 };
 
-Compressed compress(const test::Keys& keys, int threads) {
+Compressed compress(const test::Keys& keys, const test::Executor& executor = test::executor(1)) {
   std::vector<std::uint8_t> levels;
   for (std::size_t j = 0; j + 1 < keys.size(); ++j) {
     levels.push_back(static_cast<std::uint8_t>(test::first_difference(keys[j], keys[j + 1])));
   }
-  Compressed out;
-  out.children.resize(2 * levels.size());
-  out.root = stages::path_compression({.threads = threads}, keys, levels, out.children);
-  return out;
+  test::Array<Link> children(2 * levels.size());
+  const Link root =
+      stages::path_compression(executor, test::upload(keys), test::upload(levels), children);
+  return {root, children.download()};
 }
 
 // Every node of the complete binary tree of `depth` levels, in the order of a heap: node 1 is the
@@ -72,8 +73,8 @@ void expect_like_complete_tree(const std::vector<std::uint32_t>& codes, std::uin
   for (const std::uint32_t code : codes) keys.push_back({std::uint64_t{code} << (64 - depth), 0});
   std::vector<Link> want(2 * (keys.size() - 1));
   const Link root = CompleteTree(codes, depth).contract(1, want);
-  for (int threads = 1; threads <= 2; ++threads) {
-    const Compressed got = compress(keys, threads);
+  for (const test::Executor& executor : test::executors(2)) {
+    const Compressed got = compress(keys, executor);
     ASSERT_TRUE(got.root == root);
     ASSERT_EQ(got.children.size(), want.size());
     for (std::size_t i = 0; i < want.size(); ++i) {
@@ -83,7 +84,7 @@ void expect_like_complete_tree(const std::vector<std::uint32_t>& codes, std::uin
 }
 
 TEST(StageCompress, EverySetOfCodesOnALatticeOfSixteenCells) {
-  for (std::uint32_t set = 1; set < 1u << 16; set += 1 + set % 3) {
+  for (std::uint32_t set = 1; set < 1u << 16; set += test::thinning * (1 + set % 3)) {
     std::vector<std::uint32_t> codes;
     for (std::uint32_t code = 0; code < 16; ++code) {
       if ((set >> code & 1u) != 0) codes.push_back(code);
@@ -113,8 +114,8 @@ TEST(StageCompress, KeysOfTwoRounds) {
     const test::Keys keys = test::without_duplicates(c.keys);
     std::vector<Link> want;
     const Link root = test::plain_compression(keys, want);
-    for (int threads = 1; threads <= 3; ++threads) {
-      const Compressed got = compress(keys, threads);
+    for (const test::Executor& executor : test::executors(3)) {
+      const Compressed got = compress(keys, executor);
       ASSERT_TRUE(got.root == root) << c.name;
       for (std::size_t i = 0; i < want.size(); ++i) {
         ASSERT_TRUE(got.children[i] == want[i])
@@ -129,7 +130,7 @@ TEST(StageCompress, StaircasesAreAsDeepAsTheyCanBe) {
     for (const bool falling : {false, true}) {
       const test::Keys keys =
           falling ? test::falling_staircase_keys(lowest) : test::staircase_keys(lowest, 1);
-      const Compressed got = compress(keys, 1);
+      const Compressed got = compress(keys);
       Link at = got.root;
       std::uint32_t depth = 0;
       while (!at.is_leaf()) {
@@ -145,15 +146,17 @@ TEST(StageCompress, StaircasesAreAsDeepAsTheyCanBe) {
 }
 
 TEST(StageCompress, NoTrunkAndOneTrunk) {
-  EXPECT_TRUE(compress({}, 1).root.is_none());
-  EXPECT_TRUE(compress({{42, 0}}, 1).root == Link::leaf(0));
+  EXPECT_TRUE(compress({}).root.is_none());
+  EXPECT_TRUE(compress({{42, 0}}).root == Link::leaf(0));
 }
 
 TEST(StageCompress, LengthsThatDisagreeAreRefused) {
   const test::Keys keys = test::without_duplicates(test::random_keys(72, 10, 64, 0, 10));
-  std::vector<std::uint8_t> levels(keys.size() - 1);
-  std::vector<Link> children(2 * levels.size() - 1);
-  EXPECT_THROW((void)stages::path_compression({}, keys, levels, children), Error);
+  const test::Array<std::uint8_t> levels(keys.size() - 1);
+  test::Array<Link> children(2 * (keys.size() - 1) - 1);
+  EXPECT_THROW(
+      (void)stages::path_compression(test::executor(), test::upload(keys), levels, children),
+      Error);
 }
 
 }  // namespace

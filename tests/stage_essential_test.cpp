@@ -11,6 +11,7 @@
 
 #include "support/keys.hpp"
 #include "support/plain_stages.hpp"
+#include "support/platform.hpp"
 
 namespace zkd {
 namespace {
@@ -23,10 +24,10 @@ TEST(StageEssential, IsWhereNeighboursFirstDiffer) {
     for (std::size_t j = 0; j + 1 < keys.size(); ++j) {
       want.push_back(static_cast<std::uint8_t>(test::first_difference(keys[j], keys[j + 1])));
     }
-    for (int threads = 1; threads <= 3; ++threads) {
-      std::vector<std::uint8_t> levels(want.size(), 255);
-      stages::essential_nodes({.threads = threads}, keys, levels);
-      ASSERT_EQ(levels, want) << c.name;
+    for (const test::Executor& executor : test::executors(3)) {
+      test::Array<std::uint8_t> levels(want.size(), 255);
+      stages::essential_nodes(executor, test::upload(keys), levels);
+      ASSERT_EQ(levels.download(), want) << c.name;
     }
   }
 }
@@ -38,8 +39,9 @@ TEST(StageEssential, LevelsSeparateWholeTrunks) {
   const std::vector<std::uint32_t> first = test::plain_trunks(keys, 4);
   test::Keys trunk_keys;
   for (const std::uint32_t at : first) trunk_keys.push_back(keys[at]);
-  std::vector<std::uint8_t> levels(first.size() - 1);
-  stages::essential_nodes({}, trunk_keys, levels);
+  test::Array<std::uint8_t> found(first.size() - 1);
+  stages::essential_nodes(test::executor(), test::upload(trunk_keys), found);
+  const std::vector<std::uint8_t> levels = found.download();
   for (std::size_t j = 0; j < levels.size(); ++j) {
     const std::size_t end = j + 2 < first.size() ? first[j + 2] : keys.size();
     for (std::size_t i = first[j]; i < first[j + 1]; ++i) {
@@ -54,8 +56,8 @@ TEST(StageEssential, LevelsSeparateWholeTrunks) {
 
 TEST(StageEssential, LengthsThatDisagreeAreRefused) {
   const test::Keys keys = test::without_duplicates(test::random_keys(62, 10, 64, 0, 10));
-  std::vector<std::uint8_t> levels(keys.size());
-  EXPECT_THROW(stages::essential_nodes({}, keys, levels), Error);
+  test::Array<std::uint8_t> levels(keys.size());
+  EXPECT_THROW(stages::essential_nodes(test::executor(), test::upload(keys), levels), Error);
 }
 
 }  // namespace

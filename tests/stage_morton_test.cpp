@@ -12,6 +12,7 @@
 #include <zkd/stages.hpp>
 
 #include "support/plain_stages.hpp"
+#include "support/platform.hpp"
 #include "support/random.hpp"
 
 namespace zkd {
@@ -51,21 +52,21 @@ void expect_codes_as_defined(const std::vector<Box>& boxes, const Lattice& latti
     want_codes.push_back(test::plain_code(lattice, boxes[i]));
     want_ids.push_back(i);
   }
-  for (int threads = 1; threads <= 3; ++threads) {
-    for (const auto set : {cpu::InstructionSet::portable, cpu::InstructionSet::avx2}) {
-      const cpu::Executor executor{.threads = threads, .instructions = set};
-      std::vector<std::uint64_t> codes(want_codes.size());
-      std::vector<std::uint32_t> ids(want_ids.size());
-      stages::morton_encode(executor, boxes, lattice, std::span(codes), ids);
-      ASSERT_EQ(codes, want_codes) << threads << " threads";
-      ASSERT_EQ(ids, want_ids) << threads << " threads";
-      if (lattice.code_bits > 32) continue;
-      std::vector<std::uint32_t> narrow(want_codes.size());
-      std::fill(ids.begin(), ids.end(), 0u);
-      stages::morton_encode(executor, boxes, lattice, std::span(narrow), ids);
-      ASSERT_TRUE(std::equal(narrow.begin(), narrow.end(), want_codes.begin()));
-      ASSERT_EQ(ids, want_ids);
-    }
+  const test::Array<Box> given = test::upload(boxes);
+  for (const test::Executor& executor : test::all_executors(3)) {
+    test::Array<std::uint64_t> codes(want_codes.size());
+    test::Array<std::uint32_t> ids(want_ids.size());
+    stages::morton_encode(executor, given, lattice, codes, ids);
+    ASSERT_EQ(codes.download(), want_codes) << test::name(executor);
+    ASSERT_EQ(ids.download(), want_ids) << test::name(executor);
+    if (lattice.code_bits > 32) continue;
+    test::Array<std::uint32_t> narrow_codes(want_codes.size());
+    test::Array<std::uint32_t> narrow_ids(want_ids.size());
+    stages::morton_encode(executor, given, lattice, narrow_codes, narrow_ids);
+    const std::vector<std::uint32_t> narrow = narrow_codes.download();
+    ASSERT_TRUE(std::equal(narrow.begin(), narrow.end(), want_codes.begin()))
+        << test::name(executor);
+    ASSERT_EQ(narrow_ids.download(), want_ids) << test::name(executor);
   }
 }
 
@@ -209,10 +210,10 @@ TEST(StageMorton, WrongLengthsAndWidthsAreRefused) {
   const std::vector<Box> boxes = {{{0, 0, 0}, {1, 1, 1}}, Box{}, {{2, 2, 2}, {3, 3, 3}}};
   const Lattice lattice = stages::make_lattice(bounds_of(boxes), 32);
   const auto code_of_error = [&](std::size_t codes_length, std::size_t ids_length) {
-    std::vector<std::uint64_t> codes(codes_length);
-    std::vector<std::uint32_t> ids(ids_length);
+    test::Array<std::uint64_t> codes(codes_length);
+    test::Array<std::uint32_t> ids(ids_length);
     try {
-      stages::morton_encode({}, boxes, lattice, std::span(codes), ids);
+      stages::morton_encode(test::executor(), test::upload(boxes), lattice, codes, ids);
     } catch (const Error& error) {
       return error.code() == ErrorCode::invalid_view;
     }
@@ -224,9 +225,10 @@ TEST(StageMorton, WrongLengthsAndWidthsAreRefused) {
   EXPECT_FALSE(code_of_error(2, 2));
 
   const Lattice wide = stages::make_lattice(bounds_of(boxes), 48);
-  std::vector<std::uint32_t> codes(2);
-  std::vector<std::uint32_t> ids(2);
-  EXPECT_THROW(stages::morton_encode({}, boxes, wide, std::span(codes), ids), Error);
+  test::Array<std::uint32_t> codes(2);
+  test::Array<std::uint32_t> ids(2);
+  EXPECT_THROW(stages::morton_encode(test::executor(), test::upload(boxes), wide, codes, ids),
+               Error);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 
 #include "support/keys.hpp"
 #include "support/plain_stages.hpp"
+#include "support/platform.hpp"
 
 namespace zkd {
 namespace {
@@ -67,12 +68,22 @@ Trunks random_trunks(std::uint64_t seed, const Box& scene, std::uint32_t code_bi
   return out;
 }
 
+struct Planes {
+  std::vector<std::uint32_t> axes;
+  std::vector<float> planes;
+};
+
+Planes split(const Trunks& in, const test::Executor& executor = test::executor()) {
+  test::Array<std::uint32_t> axes(in.levels.size(), 7);
+  test::Array<float> planes(in.levels.size(), -1.0F);
+  stages::split_planes(executor, test::upload(in.keys), test::upload(in.levels),
+                       test::upload(in.crowd), in.lattice, test::upload(in.lattices), axes, planes);
+  return {axes.download(), planes.download()};
+}
+
 void expect_planes_as_defined(const Trunks& in) {
-  for (int threads = 1; threads <= 3; ++threads) {
-    std::vector<std::uint32_t> axes(in.levels.size(), 7);
-    std::vector<float> planes(in.levels.size(), -1.0F);
-    stages::split_planes({.threads = threads}, in.keys, in.levels, in.crowd, in.lattice,
-                         in.lattices, axes, planes);
+  for (const test::Executor& executor : test::executors(3)) {
+    const auto [axes, planes] = split(in, executor);
     for (std::size_t j = 0; j < in.levels.size(); ++j) {
       const std::uint32_t crowd = in.crowd[j + 1];
       const test::PlainPlane want =
@@ -115,9 +126,9 @@ TEST(StagePlanes, AreExactOnLatticesOfEverySize) {
 // A plane separates the cells of the trunks beside it.
 TEST(StagePlanes, SeparateTheCellsOfTheirNeighbours) {
   const Trunks in = random_trunks(99, {{-1, -1, -1}, {1, 1, 1}}, 32, AxisOrder::by_extent);
-  std::vector<std::uint32_t> axes(in.levels.size());
-  std::vector<float> planes(in.levels.size());
-  stages::split_planes({}, in.keys, in.levels, in.crowd, in.lattice, in.lattices, axes, planes);
+  const Planes found = split(in);
+  const std::vector<std::uint32_t>& axes = found.axes;
+  const std::vector<float>& planes = found.planes;
   for (std::size_t j = 0; j < in.levels.size(); ++j) {
     if (in.levels[j] >= stages::first_fine_level) continue;
     // The lowest corner of a trunk's cell along the axis: all its bits, not only the prefix.
@@ -135,12 +146,9 @@ TEST(StagePlanes, SeparateTheCellsOfTheirNeighbours) {
 }
 
 TEST(StagePlanes, LengthsThatDisagreeAreRefused) {
-  const Trunks in = random_trunks(98, {{-1, -1, -1}, {1, 1, 1}}, 32, AxisOrder::by_extent);
-  std::vector<std::uint32_t> axes(in.levels.size() - 1);
-  std::vector<float> planes(in.levels.size());
-  EXPECT_THROW(
-      stages::split_planes({}, in.keys, in.levels, in.crowd, in.lattice, in.lattices, axes, planes),
-      Error);
+  Trunks in = random_trunks(98, {{-1, -1, -1}, {1, 1, 1}}, 32, AxisOrder::by_extent);
+  in.crowd.pop_back();
+  EXPECT_THROW((void)split(in), Error);
 }
 
 }  // namespace

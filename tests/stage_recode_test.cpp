@@ -15,6 +15,7 @@
 #include <zkd/stages.hpp>
 
 #include "support/plain_stages.hpp"
+#include "support/platform.hpp"
 #include "support/random.hpp"
 
 namespace zkd {
@@ -62,18 +63,18 @@ struct Recoded {
   std::vector<Lattice> lattices;
 };
 
-Recoded recode(const Sorted& in, std::uint32_t leaf_size, bool enabled = true, int threads = 2,
+Recoded recode(const Sorted& in, std::uint32_t leaf_size, bool enabled = true,
+               const test::Executor& executor = test::executor(2),
                AxisOrder order = AxisOrder::by_extent,
                std::size_t room = std::numeric_limits<std::size_t>::max()) {
-  Recoded out;
-  out.ids = in.ids;
-  out.keys.resize(in.ids.size());
-  out.crowd.assign(in.ids.size(), 12345);
-  out.lattices.resize(std::min(room, in.ids.size()));
-  out.crowded =
-      stages::recode_crowded({.threads = threads}, in.boxes, in.lattice, in.codes, out.ids,
-                             leaf_size, order, enabled, out.keys, out.crowd, out.lattices);
-  return out;
+  test::Array<std::uint32_t> ids = test::upload(in.ids);
+  test::Array<stages::TrunkKey> keys(in.ids.size());
+  test::Array<std::uint32_t> crowd(in.ids.size(), 12345);
+  test::Array<Lattice> lattices(std::min(room, in.ids.size()));
+  const std::uint32_t crowded =
+      stages::recode_crowded(executor, test::upload(in.boxes), in.lattice, test::upload(in.codes),
+                             ids, leaf_size, order, enabled, keys, crowd, lattices);
+  return {crowded, ids.download(), keys.download(), crowd.download(), lattices.download()};
 }
 
 std::uint64_t left_aligned(std::uint64_t code, std::uint32_t bits) {
@@ -171,10 +172,10 @@ TEST(StageRecode, ClustersInALargeScene) {
       for (const AxisOrder order : {AxisOrder::by_extent, AxisOrder::cyclic}) {
         const Sorted in = sorted(clusters(51, ratio), code_bits, order);
         for (const std::uint32_t leaf_size : {1u, 4u, 16u}) {
-          for (int threads = 1; threads <= 3; ++threads) {
+          for (const test::Executor& executor : test::executors(3)) {
             SCOPED_TRACE("ratio " + std::to_string(ratio) + ", " + std::to_string(code_bits) +
                          " bits, leaf size " + std::to_string(leaf_size));
-            expect_as_defined(in, leaf_size, recode(in, leaf_size, true, threads, order));
+            expect_as_defined(in, leaf_size, recode(in, leaf_size, true, executor, order));
             if (testing::Test::HasFatalFailure()) return;
           }
         }
@@ -266,7 +267,7 @@ TEST(StageRecode, WritesAsManyLatticesAsFit) {
   const Recoded all = recode(in, 4);
   ASSERT_GE(all.crowded, 5u);
   for (const std::size_t room : {0u, 1u, 3u}) {
-    const Recoded some = recode(in, 4, true, 2, AxisOrder::by_extent, room);
+    const Recoded some = recode(in, 4, true, test::executor(2), AxisOrder::by_extent, room);
     EXPECT_EQ(some.crowded, all.crowded);
     EXPECT_EQ(some.ids, all.ids);
     for (std::size_t i = 0; i < room; ++i) {

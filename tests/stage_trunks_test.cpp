@@ -10,6 +10,7 @@
 
 #include "support/keys.hpp"
 #include "support/plain_stages.hpp"
+#include "support/platform.hpp"
 
 namespace zkd {
 namespace {
@@ -18,14 +19,15 @@ TEST(StageTrunks, AreTheLargestNodesWithinTheLeafSize) {
   for (const test::NamedKeys& c : test::hard_keys()) {
     for (const std::uint32_t leaf_size : {1u, 2u, 3u, 4u, 5u, 16u, 100u, 1024u}) {
       const std::vector<std::uint32_t> want = test::plain_trunks(c.keys, leaf_size);
-      for (int threads = 1; threads <= 3; ++threads) {
-        std::vector<std::uint32_t> first(c.keys.size());
+      for (const test::Executor& executor : test::executors(3)) {
+        test::Array<std::uint32_t> found(c.keys.size());
         const std::uint32_t count =
-            stages::find_trunks({.threads = threads}, c.keys, leaf_size, first);
+            stages::find_trunks(executor, test::upload(c.keys), leaf_size, found);
+        std::vector<std::uint32_t> first = found.download();
         ASSERT_LE(count, first.size());
         first.resize(count);
-        ASSERT_EQ(first, want) << c.name << ", leaf size " << leaf_size << ", " << threads
-                               << " threads";
+        ASSERT_EQ(first, want) << c.name << ", leaf size " << leaf_size << ", "
+                               << test::name(executor);
       }
     }
   }
@@ -34,8 +36,11 @@ TEST(StageTrunks, AreTheLargestNodesWithinTheLeafSize) {
 TEST(StageTrunks, HoldNoMoreThanTheLeafSizeUnlessTheyAreOneKey) {
   const test::Keys keys = test::random_keys(41, 30000, 20, 4, 500);
   for (const std::uint32_t leaf_size : {1u, 4u, 16u}) {
-    std::vector<std::uint32_t> first(keys.size());
-    first.resize(stages::find_trunks({}, keys, leaf_size, first));
+    test::Array<std::uint32_t> found(keys.size());
+    const std::uint32_t count =
+        stages::find_trunks(test::executor(), test::upload(keys), leaf_size, found);
+    std::vector<std::uint32_t> first = found.download();
+    first.resize(count);
     ASSERT_EQ(first.front(), 0u);
     first.push_back(static_cast<std::uint32_t>(keys.size()));
     for (std::size_t t = 0; t + 1 < first.size(); ++t) {
@@ -47,8 +52,8 @@ TEST(StageTrunks, HoldNoMoreThanTheLeafSizeUnlessTheyAreOneKey) {
 
 TEST(StageTrunks, OutputOfTheWrongLengthIsRefused) {
   const test::Keys keys = test::random_keys(42, 10, 32, 0, 10);
-  std::vector<std::uint32_t> first(9);
-  EXPECT_THROW((void)stages::find_trunks({}, keys, 4, first), Error);
+  test::Array<std::uint32_t> first(9);
+  EXPECT_THROW((void)stages::find_trunks(test::executor(), test::upload(keys), 4, first), Error);
 }
 
 }  // namespace

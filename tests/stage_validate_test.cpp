@@ -13,6 +13,7 @@
 #include <zkd/stages.hpp>
 
 #include "support/plain_stages.hpp"
+#include "support/platform.hpp"
 #include "support/random.hpp"
 
 namespace zkd {
@@ -32,11 +33,11 @@ struct Validated {
 };
 
 Validated validate(const TriangleView& view, InvalidTriangles policy = InvalidTriangles::error,
-                   int threads = 2) {
-  Validated out;
-  out.boxes.resize(view.triangle_count);
-  out.summary = stages::triangle_boxes({.threads = threads}, view, policy, out.boxes);
-  return out;
+                   const test::Executor& executor = test::executor(2)) {
+  test::Array<Box> boxes(view.triangle_count);
+  const stages::SceneSummary summary =
+      stages::triangle_boxes(executor, test::upload(view), policy, boxes);
+  return {summary, boxes.download()};
 }
 
 bool same_bits(const Box& a, const Box& b) {
@@ -242,10 +243,9 @@ TEST(StageValidate, NegativeZeroBecomesPositive) {
 // ---- Policies and first offenders ---------------------------------------------------------------
 
 void expect_error(const TriangleView& view, InvalidTriangles policy, ErrorCode code,
-                  std::uint64_t offender, int threads) {
-  std::vector<Box> boxes(view.triangle_count);
+                  std::uint64_t offender, const test::Executor& executor) {
   try {
-    (void)stages::triangle_boxes({.threads = threads}, view, policy, boxes);
+    (void)validate(view, policy, executor);
     FAIL() << "expected " << to_string(code);
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), code) << error.what();
@@ -280,9 +280,9 @@ TEST(StageValidate, FirstNonFiniteTriangleIsNamed) {
       corner(49999, 0)[axis] = bad;
       corner(31007, axis)[axis] = bad;
       corner(31008, 1)[axis] = nan_value;
-      for (int threads = 1; threads <= 4; ++threads) {
+      for (const test::Executor& executor : test::executors(4)) {
         expect_error(grid.view(), InvalidTriangles::error, ErrorCode::non_finite_vertex, 31007,
-                     threads);
+                     executor);
       }
       const Validated skipped = validate(grid.view(), InvalidTriangles::skip);
       EXPECT_EQ(skipped.summary.non_finite, 3u);
@@ -310,8 +310,8 @@ TEST(StageValidate, FirstTriangleWithAnIndexOutOfRangeIsNamed) {
       grid.faces[49999][c] = bad;
       grid.faces[12345][c] = bad;
       for (const InvalidTriangles policy : {InvalidTriangles::error, InvalidTriangles::skip}) {
-        for (int threads = 1; threads <= 4; ++threads) {
-          expect_error(grid.view(), policy, ErrorCode::index_out_of_range, 12345, threads);
+        for (const test::Executor& executor : test::executors(4)) {
+          expect_error(grid.view(), policy, ErrorCode::index_out_of_range, 12345, executor);
         }
       }
       grid.faces[12345][c] = past - 1;
@@ -324,8 +324,7 @@ TEST(StageValidate, FirstTriangleWithAnIndexOutOfRangeIsNamed) {
 TEST(StageValidate, IndicesWithoutAnyVertex) {
   const std::vector<glm::uvec3> faces = {{0, 1, 2}};
   const TriangleView view{std::span<const glm::vec3>{}, std::span<const glm::uvec3>(faces)};
-  std::vector<Box> boxes(1);
-  EXPECT_THROW((void)stages::triangle_boxes({}, view, InvalidTriangles::error, boxes), Error);
+  EXPECT_THROW((void)validate(view), Error);
 }
 
 TEST(StageValidate, UnreferencedVerticesDoNotMatter) {
@@ -370,9 +369,9 @@ TEST(StageValidate, StridedAndPackedAndSoupAgree) {
 
 TEST(StageValidate, EveryThreadCountAgrees) {
   const Grid grid(10007);
-  const Validated one = validate(grid.view(), InvalidTriangles::error, 1);
-  for (int threads = 2; threads <= 4; ++threads) {
-    const Validated more = validate(grid.view(), InvalidTriangles::error, threads);
+  const Validated one = validate(grid.view(), InvalidTriangles::error, test::executor(1));
+  for (const test::Executor& executor : test::executors(4)) {
+    const Validated more = validate(grid.view(), InvalidTriangles::error, executor);
     EXPECT_TRUE(same_bits(more.summary.bounds, one.summary.bounds));
     for (std::size_t i = 0; i < one.boxes.size(); ++i) {
       ASSERT_TRUE(same_bits(more.boxes[i], one.boxes[i]));
@@ -383,9 +382,10 @@ TEST(StageValidate, EveryThreadCountAgrees) {
 TEST(StageValidate, BoxesOfTheWrongLengthAreRefused) {
   const Grid grid(10);
   for (const std::size_t length : {0u, 9u, 11u}) {
-    std::vector<Box> boxes(length);
+    test::Array<Box> boxes(length);
     try {
-      (void)stages::triangle_boxes({}, grid.view(), InvalidTriangles::error, boxes);
+      (void)stages::triangle_boxes(test::executor(), test::upload(grid.view()),
+                                   InvalidTriangles::error, boxes);
       ADD_FAILURE() << "length " << length << " was taken";
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::invalid_view);

@@ -17,6 +17,10 @@ namespace zkd {
 /// Builds a kd-tree over `triangles` (Li, Wang, Deng: Fully Parallel Kd-Tree Construction for
 /// Real-Time Ray Tracing, I3D 2014).
 ///
+/// options.backend says where: `automatic` takes CUDA if the program links zkd::cuda and a device
+/// answers, else the CPU, and Tree::options().backend says which it was. Either way triangles are in
+/// host memory and the tree is too; zkd/cuda/build.hpp leaves it on the device.
+///
 /// Blocks until the tree is finished. For given triangles and options the tree has the same bytes
 /// on every backend, instruction set and thread count; for permuted triangles it is the same tree
 /// with ids mapped, up to the order of ids within a leaf. No triangles, or none valid, is a valid

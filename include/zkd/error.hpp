@@ -27,6 +27,7 @@ enum class ErrorCode {
   unsupported_option,   ///< a valid option that this version does not build yet; offender: 0
   backend_unavailable,  ///< the backend asked for is not linked, or no device answers; offender: 0
   out_of_memory,        ///< the memory resource refused; offender: the bytes asked for
+  device_failure,       ///< a call to CUDA failed; offender: its cudaError_t
 };
 
 /// The name of `code` as written above, for logs. Static storage.

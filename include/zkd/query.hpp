@@ -44,8 +44,8 @@ namespace zkd {
 [[nodiscard]] ZKD_API bool any_hit(const TreeView& tree, const TriangleView& triangles,
                                    const Ray& ray) noexcept;
 
-/// Work one ray caused. Counts may differ between instruction sets by rounding in box tests;
-/// answers do not.
+/// Work one ray caused. Counts may differ between backends and instruction sets, by rounding in
+/// box tests; answers do not.
 struct TraversalCost {
   std::uint32_t node_visits = 0;     ///< inner nodes whose two boxes were tested
   std::uint32_t triangle_tests = 0;  ///< a triangle counts once for each leaf it was tested in

@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The stages of the Morton builder, one public function each, in the order of the poster. build()
-// gives the bytes of their composition. They are there to time one, to put another in its place, and
-// to test each by itself.
+// gives the bytes of their composition. They are there to time one, to put another in its place,
+// and to test each by itself.
 //
-// Every function dispatches on the executor it is given, works on spans the caller owns (host
-// memory for cpu::Executor), runs on all threads of the executor, and blocks until done. Scratch
-// comes from the executor's memory. Spans must not overlap. n is the number of triangles that the
-// function is given.
+// Every function runs where its executor says: a cpu::Executor, or a cuda::Executor (include
+// zkd/cuda/executor.hpp). The library zkd::zkd has all of them for cpu::Executor, zkd::cuda for
+// cuda::Executor; with any other type a program does not link. A braced list ({.threads = 2}, or
+// {}) is a cpu::Executor.
+//
+// Arrays are spans the caller owns: host memory for cpu::Executor, memory of the device for
+// cuda::Executor, and so are those that a TriangleView or a Skeleton names. Everything else,
+// results included, is a value on the host. A call blocks until done, on CUDA too: there it waits
+// for the stream, several times. Scratch comes from the executor's memory (its workspace is left
+// alone). Spans must not overlap. n is the number of triangles that the function is given.
 //
 // All throw Error: invalid_view for a span of the wrong length, invalid_option for a number outside
-// its range, too_many_triangles for spans longer than max_count, out_of_memory; beyond those, what
-// each says. Values that contradict each other (codes not sorted, a level that is not that of its
-// trunks) are not found out.
+// its range, too_many_triangles for spans longer than max_count, out_of_memory; on CUDA
+// backend_unavailable and device_failure; beyond those, what each says. Values that contradict each
+// other (codes not sorted, a level that is not that of its trunks) are not found out.
 #pragma once
 
 #include <cstdint>
@@ -41,7 +47,8 @@ struct SceneSummary {
 ///
 /// Throws Error invalid_view, index_out_of_range, and non_finite_vertex unless `invalid` is skip;
 /// each names the first offender. Zero area is decided exactly. O(n).
-ZKD_API SceneSummary triangle_boxes(const cpu::Executor& executor, const TriangleView& triangles,
+template <class Executor = cpu::Executor>
+ZKD_API SceneSummary triangle_boxes(const Executor& executor, const TriangleView& triangles,
                                     InvalidTriangles invalid, std::span<Box> boxes);
 
 /// Stage 2, the lattice over `bounds` (in the caller's units) with `code_bits` bits (1 to 64) at
@@ -54,19 +61,23 @@ ZKD_API SceneSummary triangle_boxes(const cpu::Executor& executor, const Triangl
 /// and the indices of those boxes in `ids`. Both spans are as long as there are such boxes
 /// (SceneSummary::valid); the centres must lie inside the lattice. Codes are right-aligned: the low
 /// lattice.code_bits bits. The 32-bit form needs lattice.code_bits <= 32. O(n).
-ZKD_API void morton_encode(const cpu::Executor& executor, std::span<const Box> boxes,
+template <class Executor = cpu::Executor>
+ZKD_API void morton_encode(const Executor& executor, std::span<const Box> boxes,
                            const Lattice& lattice, std::span<std::uint32_t> codes,
                            std::span<std::uint32_t> ids);
-ZKD_API void morton_encode(const cpu::Executor& executor, std::span<const Box> boxes,
+template <class Executor = cpu::Executor>
+ZKD_API void morton_encode(const Executor& executor, std::span<const Box> boxes,
                            const Lattice& lattice, std::span<std::uint64_t> codes,
                            std::span<std::uint32_t> ids);
 
 /// Stage 4, stable radix sort of (code, value) pairs by the low `bits` bits of the codes; the
-/// result is in the same two spans. One pass for every 8 bits; a digit that is equal in all codes
-/// needs none. Returns how many passes were left out. O(n * bits).
-ZKD_API std::uint32_t radix_sort(const cpu::Executor& executor, std::span<std::uint32_t> codes,
+/// result is in the same two spans. One pass for every 8 bits; on the CPU a digit that is equal in
+/// all codes needs none. Returns how many passes were left out: on CUDA always 0. O(n * bits).
+template <class Executor = cpu::Executor>
+ZKD_API std::uint32_t radix_sort(const Executor& executor, std::span<std::uint32_t> codes,
                                  std::span<std::uint32_t> values, std::uint32_t bits = 32);
-ZKD_API std::uint32_t radix_sort(const cpu::Executor& executor, std::span<std::uint64_t> codes,
+template <class Executor = cpu::Executor>
+ZKD_API std::uint32_t radix_sort(const Executor& executor, std::span<std::uint64_t> codes,
                                  std::span<std::uint32_t> values, std::uint32_t bits = 64);
 
 /// In no crowded trunk.
@@ -81,7 +92,8 @@ inline constexpr std::uint32_t no_crowd = 0xFFFFFFFFu;
 /// within crowded trunks. Returns the number of crowded trunks, n / (leaf_size + 1) at most; their
 /// lattices are written to `lattices` in order, as many as fit. With `enabled` false, keys are made
 /// and nothing else. O(n).
-ZKD_API std::uint32_t recode_crowded(const cpu::Executor& executor, std::span<const Box> boxes,
+template <class Executor = cpu::Executor>
+ZKD_API std::uint32_t recode_crowded(const Executor& executor, std::span<const Box> boxes,
                                      const Lattice& lattice, std::span<const std::uint64_t> codes,
                                      std::span<std::uint32_t> ids, std::uint32_t leaf_size,
                                      AxisOrder order, bool enabled, std::span<TrunkKey> keys,
@@ -91,27 +103,31 @@ ZKD_API std::uint32_t recode_crowded(const cpu::Executor& executor, std::span<co
 /// keys) that hold at most `leaf_size` triangles, 1 to 1024, or a single key. first[t] becomes the
 /// position of the first triangle of trunk t. `first` is as long as `keys`; returns the number of
 /// trunks, the rest of `first` is unspecified. O(n * leaf_size).
-ZKD_API std::uint32_t find_trunks(const cpu::Executor& executor, std::span<const TrunkKey> keys,
+template <class Executor = cpu::Executor>
+ZKD_API std::uint32_t find_trunks(const Executor& executor, std::span<const TrunkKey> keys,
                                   std::uint32_t leaf_size, std::span<std::uint32_t> first);
 
 /// Stage 7, essential nodes. levels[j] becomes the level at which trunks j and j + 1 first differ:
 /// the essential node between them. `trunk_keys` holds the key of each trunk's first triangle,
 /// keys[first[t]]; `levels` is one shorter. O(trunks).
-ZKD_API void essential_nodes(const cpu::Executor& executor, std::span<const TrunkKey> trunk_keys,
+template <class Executor = cpu::Executor>
+ZKD_API void essential_nodes(const Executor& executor, std::span<const TrunkKey> trunk_keys,
                              std::span<std::uint8_t> levels);
 
 /// Stage 8, path compression: links every essential node and every trunk directly to the essential
 /// node above it, leaving out the redundant nodes between. children[2j] and [2j + 1] become the
 /// links of node j, below and above its plane. Returns the root: a leaf for one trunk, none for no
 /// trunk. O(trunks * log trunks) at worst; most nodes are settled by looking at a few neighbours.
-ZKD_API Link path_compression(const cpu::Executor& executor, std::span<const TrunkKey> trunk_keys,
+template <class Executor = cpu::Executor>
+ZKD_API Link path_compression(const Executor& executor, std::span<const TrunkKey> trunk_keys,
                               std::span<const std::uint8_t> levels, std::span<Link> children);
 
 /// Stage 9, split planes: axis and position (in the caller's units, exact) of each essential node,
 /// from the key of trunk j + 1, the first above the plane, with the bits after the node's level
 /// cleared. crowd[t] is the crowded trunk that trunk t belongs to, or no_crowd: stage 5's at
 /// position first[t]. `lattices` are those of stage 5, all of them. O(trunks).
-ZKD_API void split_planes(const cpu::Executor& executor, std::span<const TrunkKey> trunk_keys,
+template <class Executor = cpu::Executor>
+ZKD_API void split_planes(const Executor& executor, std::span<const TrunkKey> trunk_keys,
                           std::span<const std::uint8_t> levels,
                           std::span<const std::uint32_t> crowd, const Lattice& lattice,
                           std::span<const Lattice> lattices, std::span<std::uint32_t> axes,
@@ -135,7 +151,8 @@ struct Skeleton {
 ///
 /// Throws Error too_many_references, unsupported_option; and invalid_view where an index in the
 /// skeleton is out of range. O(triangles) for once, O((triangles + references) * depth) for all.
-ZKD_API std::uint64_t list_references(const cpu::Executor& executor, const TriangleView& triangles,
+template <class Executor = cpu::Executor>
+ZKD_API std::uint64_t list_references(const Executor& executor, const TriangleView& triangles,
                                       std::span<const Box> boxes, const Skeleton& skeleton,
                                       const Lattice& lattice, References policy,
                                       std::span<std::uint32_t> leaf_offsets,
@@ -147,7 +164,8 @@ ZKD_API std::uint64_t list_references(const cpu::Executor& executor, const Trian
 /// depth).
 ///
 /// Throws Error unsupported_option; and invalid_view where an index is out of range.
-ZKD_API void tight_boxes(const cpu::Executor& executor, std::span<const Box> boxes,
+template <class Executor = cpu::Executor>
+ZKD_API void tight_boxes(const Executor& executor, std::span<const Box> boxes,
                          const Skeleton& skeleton, References policy,
                          std::span<const std::uint32_t> leaf_offsets,
                          std::span<const std::uint32_t> references, std::span<Node> nodes);

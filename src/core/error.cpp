@@ -30,6 +30,8 @@ const char* to_string(ErrorCode code) noexcept {
       return "backend_unavailable";
     case ErrorCode::out_of_memory:
       return "out_of_memory";
+    case ErrorCode::device_failure:
+      return "device_failure";
   }
   return "unknown";
 }

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <memory_resource>
 #include <string>
 #include <utility>
@@ -33,7 +34,7 @@ namespace zkd::cpu {
 /// writes through pointers cannot reach.
 template <class Functor>
 Functor loaded(Functor f) {
-  if constexpr (requires { f.load(); }) f.load();
+  if constexpr (core::Loads<Functor>) f.load();
   return f;
 }
 
@@ -217,6 +218,21 @@ class Backend {
     blocks_[blocks_used_++] = lay_out(layout, counts...);
   }
 
+  /// A copy until the build ends.
+  template <class T>
+  T* keep(const T& value) {
+    struct Room {
+      T* place;
+      void lay_out(core::Arena& arena) { place = arena.take<T>(1); }
+    } room{};
+    take(room);
+    return std::construct_at(room.place, value);
+  }
+  template <class T>
+  [[nodiscard]] static T read(const T* value) {
+    return *value;
+  }
+
   /// See zkd::memory_requirement.
   static MemoryRequirement requirement(const Executor& executor, std::uint64_t triangle_count,
                                        const BuildOptions& options, bool wide_codes,
@@ -318,7 +334,7 @@ class Backend {
     }
   }
 
-  static constexpr int max_blocks = 4;  // a build takes three workspaces at most, a stage two
+  static constexpr int max_blocks = 16;  // a build takes three at most, a stage fourteen
 
   FloatEnvironment environment_;  // for the serial steps between passes
   Threads threads_;

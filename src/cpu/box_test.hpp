@@ -3,7 +3,10 @@
 // core::BoxTest in vectors of four: low and high sides of both children at once, for AVX2 and FMA.
 #pragma once
 
+#include <cstdint>
+
 #include <zkd/traversal/traverse.hpp>
+
 #include "cpu/instruction_set.hpp"
 
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -16,15 +19,17 @@ class Avx2BoxTest {
  public:
   ZKD_CPU_AVX2 explicit Avx2BoxTest(const core::PreparedRay& ray)
       : first_(_mm_set1_ps(ray.first.value)) {
-    for (int a = 0; a < 3; ++a) {
+    for (std::uint32_t a = 0; a < 3; ++a) {
       origin_[a] = _mm_set1_ps(ray.origin[a].value);
       inverse_[a] = _mm_set1_ps(ray.inverse[a].value);
       const float p = ray.padding[a].value;
       padding_[a] = _mm_setr_ps(-p, -p, p, p);
       // Lanes of Node::bounds in the order near, near, far, far.
-      near_far_[a] = ray.negative[a] != 0 ? _mm_setr_epi32(2, 3, 0, 1) : _mm_setr_epi32(0, 1, 2, 3);
+      near_far_[a] = ray.is_negative(a) ? _mm_setr_epi32(2, 3, 0, 1) : _mm_setr_epi32(0, 1, 2, 3);
     }
   }
+
+  [[nodiscard]] static const Node& read(const Node& node) { return node; }
 
   ZKD_CPU_AVX2 core::Entries operator()(const Node& node, core::Real last) const {
     __m128 t[3];

@@ -58,6 +58,7 @@ class Block {
   }
 
   [[nodiscard]] void* data() const noexcept { return data_; }
+  [[nodiscard]] std::pmr::memory_resource* memory() const noexcept { return memory_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
   /// The caller gives it back from now on.
   void* release() noexcept { return std::exchange(data_, nullptr); }

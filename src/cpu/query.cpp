@@ -97,15 +97,7 @@ void closest_hit_brute_force(const cpu::Executor& executor, const TreeView& tree
                              std::span<Hit> hits) noexcept {
   const std::size_t count = std::min(rays.size(), hits.size());
   for_each_ray(cpu::Threads(executor), count, 1, [=](std::size_t i) {
-    const core::PreparedRay ray(tree, rays[i]);
-    core::Candidate best;
-    for (std::uint32_t id = 0; ray.valid && id < triangles.triangle_count; ++id) {
-      const core::Corners corners = core::corners_of(triangles, id);
-      core::Candidate candidate = best;
-      // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
-      if (core::intersect(ray, corners, id, candidate) && core::is_valid(corners)) best = candidate;
-    }
-    hits[i] = core::to_hit(best);
+    hits[i] = core::to_hit(core::trace_brute_force(tree, triangles, rays[i]));
   });
 }
 

@@ -9,6 +9,9 @@
 
 namespace zkd::scene {
 
+/// Whether this program was built with OpenImageIO, without which write_png only throws.
+[[nodiscard]] bool can_write_png() noexcept;
+
 /// Writes an 8-bit sRGB PNG. `rgb` is linear light, row by row, row 0 on top; values outside
 /// [0, 1] are clamped, NaN becomes 0. Folders that do not exist are made.
 ///

@@ -25,9 +25,15 @@ class LoadError : public std::runtime_error {
 /// glTF nodes are put in their place by their transforms, each instance a copy; points and lines
 /// are no triangles and are passed over, in OBJ too.
 ///
+/// OBJ, PLY and STL are read by zkd, strictly, and where the program has tinyobjloader or Assimp
+/// once more by that: both must see the same mesh. glTF needs Assimp.
+///
 /// Throws LoadError for a file that cannot be read, ends early, contradicts its own counts, has a
 /// coordinate that is not a finite number in float, has an index that names no vertex, or has no
 /// triangle at all. Draws a Progress.
 [[nodiscard]] Mesh load_mesh(const std::filesystem::path& file);
+
+/// Whether this program was built with Assimp, without which a glTF file is a LoadError.
+[[nodiscard]] bool can_read_gltf() noexcept;
 
 }  // namespace zkd::scene

@@ -403,6 +403,8 @@ void append(Mesh& mesh, const aiMesh& part, const Transform& transform, const So
 
 }  // namespace
 
+bool can_read_gltf() noexcept { return true; }
+
 Mesh load_gltf(const SourceFile& file, Progress& progress) {
   const std::uint64_t expected = GltfCheck(file).triangles();
   progress.advance(file.size());

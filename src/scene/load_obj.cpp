@@ -1,20 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Wavefront OBJ: our own strict look at every `v` and `f`, then tinyobjloader.
-//
-// tinyobjloader reads on where a file is broken (`zz` and `nan` become 0, faces of two corners and
-// indices past the end pass), and its numbers may be an ulp off. So each statement is checked here
-// first, with its line; the coordinates are taken from here, the polygons from tinyobjloader; and
-// the two have to agree on everything.
-#include <tiny_obj_loader.h>
-
+// Wavefront OBJ: our own strict reading of every `v` and `f`, with the line where something is
+// wrong, and a second reading by tinyobjloader that has to agree on everything.
 #include <algorithm>
 #include <charconv>
-#include <istream>
 #include <limits>
-#include <streambuf>
 #include <utility>
 
+#include "scene/second_reader.hpp"
 #include "scene/source_file.hpp"
 
 namespace zkd::scene {
@@ -32,7 +25,7 @@ class ObjScan {
     check_forward_references();
   }
 
-  [[nodiscard]] Outline take() { return std::move(outline_); }
+  [[nodiscard]] Reading take() { return std::move(reading_); }
 
  private:
   // The text is only ever overwritten by blanks, so offsets stay; lines that were joined are
@@ -82,7 +75,7 @@ class ObjScan {
     }
   }
 
-  /// A comment may follow a statement; tinyobjloader would read on in it.
+  /// A comment may follow a statement; a lenient reader would read on in it.
   std::size_t strip_comment(std::size_t at, std::size_t end) {
     const auto first = text_.begin() + static_cast<std::ptrdiff_t>(at);
     const auto last = text_.begin() + static_cast<std::ptrdiff_t>(end);
@@ -105,7 +98,7 @@ class ObjScan {
       at = stop;
     }
     if (count < 3) fail(start, "a vertex needs 3 coordinates, not " + std::to_string(count));
-    outline_.positions.emplace_back(xyz[0], xyz[1], xyz[2]);
+    reading_.mesh.positions.emplace_back(xyz[0], xyz[1], xyz[2]);
   }
 
   void face(std::size_t at, std::size_t end, std::size_t start) {
@@ -118,8 +111,8 @@ class ObjScan {
     if (indices_.size() < 3) {
       fail(start, "a face needs 3 corners, not " + std::to_string(indices_.size()));
     }
-    outline_.begin_polygon(indices_.size());
-    for (const std::uint64_t index : indices_) outline_.mix(index);
+    reading_.begin_polygon(indices_.size());
+    for (const std::uint64_t index : indices_) reading_.corner(index);
   }
 
   /// The vertex a corner `v`, `v/vt`, `v//vn` or `v/vt/vn` names, counted from 0.
@@ -131,7 +124,7 @@ class ObjScan {
     if (!parse_index(first, index)) fail(at, "corner " + in_quotes(token) + " is not an index");
     if (slash != std::string_view::npos) check_attributes(token, slash, at);
     if (index == 0) fail(at, "vertex index 0: OBJ counts from 1");
-    const auto known = static_cast<std::int64_t>(outline_.positions.size());
+    const auto known = static_cast<std::int64_t>(reading_.mesh.positions.size());
     if (index < 0) {
       if (-index > known) {
         fail(at, "vertex index " + std::string(first) + " reaches back before the first of " +
@@ -171,7 +164,7 @@ class ObjScan {
   /// indices ahead of their time only those larger than all before are kept: the first that is too
   /// large in the end is always among them.
   void check_forward_references() {
-    const auto count = static_cast<std::int64_t>(outline_.positions.size());
+    const auto count = static_cast<std::int64_t>(reading_.mesh.positions.size());
     for (const auto& [at, index] : forward_) {
       if (index > count) {
         fail(at, "vertex index " + std::to_string(index) + " is out of range: the file has " +
@@ -202,98 +195,19 @@ class ObjScan {
   std::vector<std::size_t> joined_;  // offsets of the backslashes that joined two lines
   std::vector<std::pair<std::size_t, std::int64_t>> forward_;
   std::vector<std::uint64_t> indices_;
-  Outline outline_;
-};
-
-/// Text in memory as a stream, in pieces so that progress can be seen.
-class TextStream : public std::streambuf {
- public:
-  TextStream(std::string& text, Progress& progress) : text_(text), progress_(progress) {}
-
- protected:
-  int_type underflow() override {
-    if (next_ == text_.size()) return traits_type::eof();
-    const std::size_t size = std::min(chunk, text_.size() - next_);
-    char* const first = text_.data() + next_;
-    setg(first, first, first + size);
-    next_ += size;
-    progress_.advance(size);
-    return traits_type::to_int_type(*first);
-  }
-
- private:
-  std::string& text_;
-  Progress& progress_;
-  std::size_t next_ = 0;
-};
-
-/// What tinyobjloader calls back with, put together.
-struct Assembly {
-  const SourceFile& file;
-  const Outline& expected;
-  std::vector<glm::uvec3> faces;
-  std::uint64_t vertices = 0;
-  Outline seen;
-
-  void vertex(float x, float y, float z) {
-    if (vertices >= expected.positions.size() ||
-        !nearly_equal(expected.positions[vertices], x, y, z)) {
-      disagree("vertex " + std::to_string(vertices + 1));
-    }
-    ++vertices;
-  }
-
-  void polygon(const tinyobj::index_t* corners, int count) {
-    seen.begin_polygon(static_cast<std::uint64_t>(count));
-    const auto resolve = [this](int index) {
-      return static_cast<std::uint32_t>(index > 0 ? std::int64_t{index} - 1
-                                                  : static_cast<std::int64_t>(vertices) + index);
-    };
-    for (int i = 0; i < count; ++i) seen.mix(resolve(corners[i].vertex_index));
-    const std::uint32_t first = resolve(corners[0].vertex_index);
-    for (int i = 1; i + 1 < count; ++i) {
-      faces.emplace_back(first, resolve(corners[i].vertex_index),
-                         resolve(corners[i + 1].vertex_index));
-    }
-  }
-
-  [[noreturn]] void disagree(const std::string& where) const {
-    file.fail("tinyobjloader and zkd read " + where + " differently; the file is not trusted");
-  }
+  Reading reading_;
 };
 
 }  // namespace
 
 Mesh load_obj(SourceFile& file, Progress& progress) {
-  Outline expected = ObjScan(file, progress).take();
-  if (expected.polygons == 0) file.fail("contains no triangle");
-  if (expected.positions.size() > max_count || expected.triangles() > max_count) {
+  Reading reading = ObjScan(file, progress).take();
+  if (reading.outline.polygons == 0) file.fail("contains no triangle");
+  if (reading.mesh.positions.size() > max_count || reading.triangles() > max_count) {
     file.fail("has more than 2147483647 vertices or triangles");
   }
-
-  Assembly assembly{file, expected, {}, 0, {}};
-  assembly.faces.reserve(expected.triangles());
-  tinyobj::callback_t callbacks;
-  callbacks.vertex_cb = [](void* to, float x, float y, float z, float) {
-    static_cast<Assembly*>(to)->vertex(x, y, z);
-  };
-  callbacks.index_cb = [](void* to, tinyobj::index_t* corners, int count) {
-    static_cast<Assembly*>(to)->polygon(corners, count);
-  };
-  TextStream buffer(file.bytes(), progress);
-  std::istream stream(&buffer);
-  std::string warnings;
-  std::string errors;
-  if (!tinyobj::LoadObjWithCallback(stream, callbacks, &assembly, nullptr, &warnings, &errors)) {
-    file.fail("tinyobjloader: " + errors.substr(0, errors.find('\n')));
-  }
-  const Outline& seen = assembly.seen;
-  if (assembly.vertices != expected.positions.size()) assembly.disagree("the number of vertices");
-  if (seen.polygons != expected.polygons || seen.corners != expected.corners ||
-      seen.digest != expected.digest) {
-    assembly.disagree("the faces");
-  }
-  return {std::move(expected.positions), std::move(assembly.faces)};
+  compare_obj_with_tinyobjloader(file, reading, progress);
+  return std::move(reading.mesh);
 }
 
 }  // namespace zkd::scene

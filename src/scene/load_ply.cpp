@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// PLY, text and binary: our own strict walk along the header's elements, then Assimp.
-//
-// Assimp's numbers from text may be an ulp off, and it reads on where a file contradicts its
-// header. So every row is checked here first, with its line or byte; the coordinates are taken
-// from here, the polygons from Assimp; and the two have to agree on everything.
+// PLY, text and binary: our own strict walk along the header's elements, with line or byte where
+// something is wrong, and a second reading by Assimp that has to agree on everything.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <charconv>
@@ -14,7 +12,7 @@
 #include <optional>
 #include <utility>
 
-#include "scene/assimp_reader.hpp"
+#include "scene/second_reader.hpp"
 #include "scene/source_file.hpp"
 
 namespace zkd::scene {
@@ -401,7 +399,7 @@ class BodyWalk {
     for (const Element& element : header.elements) {
       if (element.name == "vertex") vertex_count_ = element.count;
     }
-    outline_.positions.reserve(std::min<std::uint64_t>(vertex_count_, file.size()));
+    reading_.mesh.positions.reserve(std::min<std::uint64_t>(vertex_count_, file.size()));
     for (const Element& element : header.elements) {
       for (std::uint64_t row = 0; row < element.count; ++row) {
         body_.begin_row(element, row);
@@ -418,7 +416,7 @@ class BodyWalk {
     report();
   }
 
-  Outline take() { return std::move(outline_); }
+  Reading take() { return std::move(reading_); }
 
  private:
   void vertex(const Element& element, std::uint64_t row) {
@@ -434,7 +432,7 @@ class BodyWalk {
         body_.skip(property.type, element, row);
       }
     }
-    outline_.positions.push_back(position);
+    reading_.mesh.positions.push_back(position);
   }
 
   void other(const Element& element, std::uint64_t row, bool face) {
@@ -456,14 +454,14 @@ class BodyWalk {
                  " corners; a triangle needs 3");
     }
     body_.expect(size, property.type, element, row);
-    outline_.begin_polygon(static_cast<std::uint64_t>(size));
+    reading_.begin_polygon(static_cast<std::uint64_t>(size));
     for (std::int64_t i = 0; i < size; ++i) {
       const std::int64_t index = body_.integer(property.type, element, row);
       if (index < 0 || index >= static_cast<std::int64_t>(vertex_count_)) {
         body_.fail(row_name(element, row) + " names vertex " + std::to_string(index) + " of " +
                    std::to_string(vertex_count_));
       }
-      outline_.mix(static_cast<std::uint64_t>(index));
+      reading_.corner(static_cast<std::uint64_t>(index));
     }
   }
 
@@ -484,47 +482,19 @@ class BodyWalk {
   Progress& progress_;
   std::size_t reported_ = 0;
   std::uint64_t vertex_count_ = 0;
-  Outline outline_;
+  Reading reading_;
 };
 
 }  // namespace
 
 Mesh load_ply(const SourceFile& file, Progress& progress) {
   const Header header = HeaderReader(file).read();
-  Outline expected = header.format == Format::text
-                         ? BodyWalk<TextBody>(file, header, progress).take()
-                         : BodyWalk<BinaryBody>(file, header, progress).take();
-  if (expected.triangles() > max_count) file.fail("has more than 2147483647 triangles");
-
-  Assimp::Importer importer;
-  const aiScene& scene = read_with_assimp(importer, file);
-  const auto disagree = [&file](const std::string& where) {
-    file.fail("Assimp and zkd read " + where + " differently; the file is not trusted");
-  };
-  if (scene.mNumMeshes != 1) disagree("the number of meshes");
-  const aiMesh& read = *scene.mMeshes[0];
-  if (read.mNumVertices != expected.positions.size()) disagree("the number of vertices");
-  for (unsigned i = 0; i < read.mNumVertices; ++i) {
-    const aiVector3D& p = read.mVertices[i];
-    if (!nearly_equal(expected.positions[i], p.x, p.y, p.z)) {
-      disagree("vertex " + std::to_string(i));
-    }
-  }
-
-  Mesh mesh;
-  mesh.faces.reserve(expected.triangles());
-  Outline seen;
-  for (unsigned i = 0; i < read.mNumFaces; ++i) {
-    const aiFace& face = read.mFaces[i];
-    seen.begin_polygon(face.mNumIndices);
-    for (unsigned k = 0; k < face.mNumIndices; ++k) seen.mix(face.mIndices[k]);
-    for (unsigned k = 1; k + 1 < face.mNumIndices; ++k) {
-      mesh.faces.emplace_back(face.mIndices[0], face.mIndices[k], face.mIndices[k + 1]);
-    }
-  }
-  if (seen.polygons != expected.polygons || seen.digest != expected.digest) disagree("the faces");
-  mesh.positions = std::move(expected.positions);
-  return mesh;
+  Reading reading = header.format == Format::text
+                        ? BodyWalk<TextBody>(file, header, progress).take()
+                        : BodyWalk<BinaryBody>(file, header, progress).take();
+  if (reading.triangles() > max_count) file.fail("has more than 2147483647 triangles");
+  compare_ply_with_assimp(file, reading);
+  return std::move(reading.mesh);
 }
 
 }  // namespace zkd::scene

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// STL, text and binary: our own strict look, then Assimp.
-//
-// As for PLY: sizes, grammar and numbers are checked here first, with line or byte, and Assimp has
-// to agree on every corner.
+// STL, text and binary: sizes, grammar and numbers read and checked here, with line or byte where
+// something is wrong, and a second reading by Assimp that has to agree on every corner.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <utility>
 
-#include "scene/assimp_reader.hpp"
+#include "scene/second_reader.hpp"
 #include "scene/source_file.hpp"
 
 namespace zkd::scene {
@@ -170,30 +168,11 @@ Mesh load_stl(const SourceFile& file, Progress& progress) {
   if (mesh.positions.empty()) file.fail("contains no triangle");
   if (mesh.positions.size() > max_count) file.fail("has more than 715827882 triangles");
 
-  Assimp::Importer importer;
-  const aiScene& scene = read_with_assimp(importer, file);
-  const auto disagree = [&file](const std::string& where) {
-    file.fail("Assimp and zkd read " + where + " differently; the file is not trusted");
-  };
-  std::size_t corner = 0;
-  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
-    const aiMesh& part = *scene.mMeshes[m];
-    for (unsigned f = 0; f < part.mNumFaces; ++f) {
-      const aiFace& face = part.mFaces[f];
-      if (face.mNumIndices != 3) disagree("triangle " + std::to_string(corner / 3));
-      const auto first = static_cast<std::uint32_t>(corner);
-      for (unsigned k = 0; k < 3; ++k, ++corner) {
-        const unsigned index = face.mIndices[k];
-        if (corner >= mesh.positions.size() || index >= part.mNumVertices ||
-            !nearly_equal(mesh.positions[corner], part.mVertices[index].x, part.mVertices[index].y,
-                          part.mVertices[index].z)) {
-          disagree("triangle " + std::to_string(corner / 3));
-        }
-      }
-      mesh.faces.emplace_back(first, first + 1, first + 2);
-    }
+  mesh.faces.reserve(mesh.positions.size() / 3);
+  for (std::uint32_t corner = 0; corner < mesh.positions.size(); corner += 3) {
+    mesh.faces.emplace_back(corner, corner + 1, corner + 2);
   }
-  if (corner != mesh.positions.size()) disagree("the number of triangles");
+  compare_stl_with_assimp(file, mesh);
   return mesh;
 }
 

@@ -94,11 +94,4 @@ std::string in_quotes(std::string_view token) {
   return "'" + text + (token.size() > longest ? "...'" : "'");
 }
 
-bool nearly_equal(const glm::vec3& exact, float x, float y, float z) {
-  const auto near = [](float a, float b) {
-    return std::fabs(a - b) <= 1e-5F * std::fabs(a) + 1e-30F;
-  };
-  return near(exact.x, x) && near(exact.y, y) && near(exact.z, z);
-}
-
 }  // namespace zkd::scene

@@ -51,26 +51,52 @@ class SourceFile {
 /// A token for an error message: quoted, cut short, control characters as '?'.
 [[nodiscard]] std::string in_quotes(std::string_view token);
 
-/// What our own pass over a file found, to hold against what the library read from it: a reader
-/// that is lenient where we are strict would otherwise give a smaller or different mesh silently.
+/// Polygons in a few numbers: two readings of a file that agree in all of them are the same.
 struct Outline {
-  std::vector<glm::vec3> positions;  ///< correctly rounded
   std::uint64_t polygons = 0;
   std::uint64_t corners = 0;  ///< of all polygons
   std::uint64_t digest = 0;   ///< of all sizes and indices in order
-  [[nodiscard]] std::uint64_t triangles() const { return corners - 2 * polygons; }
 
-  /// One more polygon, then its indices one by one.
+  /// One more polygon, then its corners one by one.
   void begin_polygon(std::uint64_t size) {
     ++polygons;
     corners += size;
     mix(~size);
   }
+  void corner(std::uint64_t index) { mix(index); }
+
+  friend bool operator==(const Outline&, const Outline&) = default;
+
+ private:
   void mix(std::uint64_t value) { digest = (digest ^ value) * 0x9E3779B97F4A7C15u + 1; }
 };
 
-/// Whether a library's rounding of a coordinate is the one of `exact` give or take a few ulp.
-[[nodiscard]] bool nearly_equal(const glm::vec3& exact, float x, float y, float z);
+/// What our own pass over a file has read: the mesh, complete, and the outline that a library's
+/// reading of the same file must have (second_reader.hpp).
+struct Reading {
+  Mesh mesh;  ///< coordinates correctly rounded
+  Outline outline;
+  [[nodiscard]] std::uint64_t triangles() const { return outline.corners - 2 * outline.polygons; }
+
+  /// One more polygon, then its corners one by one: they become the fan round the first.
+  void begin_polygon(std::uint64_t size) {
+    outline.begin_polygon(size);
+    corners_ = 0;
+  }
+  void corner(std::uint64_t index) {
+    outline.corner(index);
+    const auto vertex = static_cast<std::uint32_t>(index);  // its range is checked by the reader
+    if (corners_ >= 2) mesh.faces.emplace_back(first_, last_, vertex);
+    if (corners_ == 0) first_ = vertex;
+    last_ = vertex;
+    ++corners_;
+  }
+
+ private:
+  std::uint64_t corners_ = 0;  // of the polygon that has begun
+  std::uint32_t first_ = 0;
+  std::uint32_t last_ = 0;
+};
 
 /// Readers of one format each; `file` is loaded, what they return is complete and checked.
 [[nodiscard]] Mesh load_obj(SourceFile& file, Progress& progress);

@@ -56,7 +56,8 @@ elseif(CASE STREQUAL "find_package")
   readme_block(cpp program)
   file(WRITE "${WORK_DIR}/readme.cpp" "${program}")
   configure_and_build("${sources}/find_package" "-DCMAKE_PREFIX_PATH=${prefix}"
-                      "-DZKD_EXPECTED_VERSION=${VERSION}" "-DREADME_PROGRAM=${WORK_DIR}/readme.cpp")
+                      "-DZKD_EXPECTED_VERSION=${VERSION}" "-DZKD_EXPECTED_CUDA=${CUDA}"
+                      "-DREADME_PROGRAM=${WORK_DIR}/readme.cpp")
   step("running the README's program" "${build}/readme")
   readme_block(text expected)
   if(NOT output STREQUAL expected)
@@ -64,10 +65,14 @@ elseif(CASE STREQUAL "find_package")
   endif()
   step("running bits" "${build}/bits")
   file(WRITE "${WORK_DIR}/find_package.txt" "${output}")
+  if(CUDA)
+    step("running either" "${build}/either")
+    message(STATUS "${output}")
+  endif()
 
 elseif(CASE STREQUAL "other_flags")
   configure_and_build("${sources}/find_package" "-DCMAKE_PREFIX_PATH=${prefix}"
-                      "-DZKD_EXPECTED_VERSION=${VERSION}"
+                      "-DZKD_EXPECTED_VERSION=${VERSION}" "-DZKD_EXPECTED_CUDA=${CUDA}"
                       "-DCMAKE_CXX_FLAGS=-O3 -march=native -ffp-contract=fast -ffast-math")
   run_bits()
 

@@ -17,10 +17,13 @@ namespace zkd {
 
 /// closest_hit for each ray. All spans and views are device memory: `tree` is cuda::Tree::view(),
 /// `triangles` cuda::Tree::triangles(). hits[i] belongs to rays[i]. Enqueued on the executor's
-/// stream; returns at once. Allocates nothing; may be captured in a graph.
+/// stream; returns at once. Allocates nothing; may be captured in a graph. Everything must stay,
+/// and rays, tree and triangles unchanged, until the stream has come past it.
 ///
 /// `hits` (and `costs`, unless empty) should be as long as `rays`; a shorter one ends the work at
-/// its length. Spans must not overlap. Throws Error backend_unavailable, device_failure.
+/// its length. Spans must not overlap. A thread traces one ray, so neighbouring rays should be
+/// alike. Throws Error backend_unavailable, device_failure for what is known at the call; what
+/// fails on the device comes up where the stream is waited for.
 ZKD_API void closest_hit(const cuda::Executor& executor, const TreeView& tree,
                          const TriangleView& triangles, std::span<const Ray> rays,
                          std::span<Hit> hits, std::span<TraversalCost> costs = {});

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory_resource>
 
 #include <zkd/config.hpp>
@@ -13,6 +14,10 @@
 #include <zkd/options.hpp>
 #include <zkd/statistics.hpp>
 #include <zkd/tree.hpp>
+
+namespace zkd::core {
+struct BuildState;
+}
 
 namespace zkd::cuda {
 
@@ -24,8 +29,8 @@ namespace zkd::cuda {
 /// that far, and throws what went wrong in the build. A build that failed leaves an empty tree,
 /// which every ray misses.
 ///
-/// Movable, not copyable. Its memory is given back in the order of the stream it was built on. The
-/// destructor does not wait.
+/// Movable, not copyable. Its memory is given back in the order of the stream it was built on, which
+/// must outlive it. The destructor does not wait.
 class ZKD_API Tree {
  public:
   /// An empty tree: every ray misses.
@@ -84,8 +89,9 @@ class ZKD_API Tree {
   BuildOptions options_;
   Block block_;
   Block triangle_block_;
-  void* record_ = nullptr;           // what the last build found, in block_
-  std::size_t workspace_bytes_ = 0;  // that a rebuild needs
+  core::BuildState* record_ = nullptr;  // what the last build found, in block_
+  std::uint64_t triangle_capacity_ = 0;
+  std::size_t workspace_bytes_ = 0;  // that the build needed
   MemoryResource* memory_ = nullptr;
   Stream stream_ = nullptr;
 };

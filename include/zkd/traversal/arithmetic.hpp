@@ -7,6 +7,14 @@
 // traversal is also compiled into users' kernels, with their flags. Rounded<T> therefore spells out
 // every operation: on the device by the intrinsics that are never fused, on the host by plain
 // operators under the library's flags. fma() is the only fused operation, and explicit.
+//
+// The files of this folder are the traversal itself, which device code includes by way of
+// zkd/cuda/device.hpp. Host programs call zkd/query.hpp: what they would compile from here has the
+// bits that their flags give it.
+//
+// In this folder no sum, difference, product or quotient is taken of plain floats or doubles,
+// unless of constants: all are Rounded. Signs, comparisons and conversions are exact or rounded
+// once everywhere, and stay plain.
 #pragma once
 
 #include <bit>
@@ -26,6 +34,8 @@ __device__ inline double rounded_sum(double a, double b) { return __dadd_rn(a, b
 __device__ inline double rounded_difference(double a, double b) { return __dsub_rn(a, b); }
 __device__ inline double rounded_product(double a, double b) { return __dmul_rn(a, b); }
 __device__ inline double rounded_quotient(double a, double b) { return __ddiv_rn(a, b); }
+__device__ inline float rounded_fma(float a, float b, float c) { return __fmaf_rn(a, b, c); }
+__device__ inline double rounded_fma(double a, double b, double c) { return __fma_rn(a, b, c); }
 #else
 template <class T>
 ZKD_HOST_DEVICE inline T rounded_sum(T a, T b) {
@@ -43,13 +53,13 @@ template <class T>
 ZKD_HOST_DEVICE inline T rounded_quotient(T a, T b) {
   return a / b;
 }
-#endif
 ZKD_HOST_DEVICE inline float rounded_fma(float a, float b, float c) {
   return __builtin_fmaf(a, b, c);
 }
 ZKD_HOST_DEVICE inline double rounded_fma(double a, double b, double c) {
   return __builtin_fma(a, b, c);
 }
+#endif
 
 /// A number each of whose operations is rounded once, to nearest.
 template <class T>
@@ -103,9 +113,21 @@ template <class T>
 ZKD_HOST_DEVICE constexpr T larger(T a, T b) {
   return a < b ? b : a;
 }
+template <class T>  // of plain numbers: compilers know a single instruction for that
+ZKD_HOST_DEVICE constexpr Rounded<T> smaller(Rounded<T> a, Rounded<T> b) {
+  return smaller(a.value, b.value);
+}
+template <class T>
+ZKD_HOST_DEVICE constexpr Rounded<T> larger(Rounded<T> a, Rounded<T> b) {
+  return larger(a.value, b.value);
+}
 
 ZKD_HOST_DEVICE inline float magnitude(float x) { return __builtin_fabsf(x); }
 ZKD_HOST_DEVICE inline double magnitude(double x) { return __builtin_fabs(x); }
+template <class T>
+ZKD_HOST_DEVICE inline Rounded<T> magnitude(Rounded<T> x) {
+  return magnitude(x.value);
+}
 
 ZKD_HOST_DEVICE inline std::uint32_t bits_of(float x) {
 #if defined(__CUDA_ARCH__)
@@ -116,6 +138,21 @@ ZKD_HOST_DEVICE inline std::uint32_t bits_of(float x) {
 }
 
 ZKD_HOST_DEVICE inline bool is_finite(float x) { return (bits_of(x) & 0x7F800000u) != 0x7F800000u; }
+
+/// of[i], i a variable. By comparisons where the array should stay in registers: on the device one
+/// that is indexed by a variable cannot. On the host an index into two elements is quicker.
+template <class T>
+[[gnu::always_inline]] ZKD_HOST_DEVICE inline T element(const T (&of)[2], std::uint32_t i) {
+#if defined(__CUDA_ARCH__)
+  return i == 0 ? of[0] : of[1];
+#else
+  return of[i];
+#endif
+}
+template <class T>
+ZKD_HOST_DEVICE inline T element(const T (&of)[3], std::uint32_t i) {
+  return i == 0 ? of[0] : i == 1 ? of[1] : of[2];
+}
 
 /// Zeros in front of the first set bit; 64 for 0.
 ZKD_HOST_DEVICE inline std::uint32_t leading_zeros(std::uint64_t x) {

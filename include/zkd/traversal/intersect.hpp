@@ -8,7 +8,8 @@
 // whether the ray passes inside. Where two of them differ in sign by more than an error bound, the
 // corners sheared in double differ as well; else those are looked at, by Kahan's difference of
 // products, whose sign is exact. So all signs belong to one set of points, and two triangles that
-// share an edge never both miss a ray through it.
+// share an edge never both miss a ray through it. For device code and the library: see
+// arithmetic.hpp.
 #pragma once
 
 #include <cstdint>
@@ -37,20 +38,20 @@ struct Candidate {
 ZKD_HOST_DEVICE inline bool surely_misses(const PreparedRay& ray, const Corners& corners) {
   Real x[3];
   Real y[3];
-  float size_x = 0.0F;
-  float size_y = 0.0F;
-  float across_x = 0.0F;
-  float across_y = 0.0F;
+  Real size_x = 0.0F;
+  Real size_y = 0.0F;
+  Real across_x = 0.0F;
+  Real across_y = 0.0F;
   for (int i = 0; i < 3; ++i) {
     const Real along = ray.from_origin(corners.p[i], 2);
     const Real right = ray.from_origin(corners.p[i], 0);
     const Real up = ray.from_origin(corners.p[i], 1);
     x[i] = fma(-ray.shear[0], along, right);
     y[i] = fma(-ray.shear[1], along, up);
-    size_x = larger(size_x, magnitude(right.value) + magnitude(along.value));
-    size_y = larger(size_y, magnitude(up.value) + magnitude(along.value));
-    across_x = larger(across_x, magnitude(x[i].value));
-    across_y = larger(across_y, magnitude(y[i].value));
+    size_x = larger(size_x, magnitude(right) + magnitude(along));
+    size_y = larger(size_y, magnitude(up) + magnitude(along));
+    across_x = larger(across_x, magnitude(x[i]));
+    across_y = larger(across_y, magnitude(y[i]));
   }
   const Real a = difference_of_products(x[2], y[1], y[2], x[1]);
   const Real b = difference_of_products(x[0], y[2], y[0], x[2]);
@@ -61,12 +62,12 @@ ZKD_HOST_DEVICE inline bool surely_misses(const PreparedRay& ray, const Corners&
   // Below 2^-96 edge functions lose digits to underflow.
   constexpr float unit = 1.0F / 16777216.0F;
   constexpr float smallest = 1.2621774e-29F;
-  const float error_x = 6.0F * unit * size_x;
-  const float error_y = 6.0F * unit * size_y;
-  const float bound =
-      larger(2.0F * (error_x * (across_y + error_y) + error_y * across_x), smallest);
-  const float least = smaller(a.value, smaller(b.value, c.value));
-  const float most = larger(a.value, larger(b.value, c.value));
+  const Real error_x = Real(6.0F * unit) * size_x;
+  const Real error_y = Real(6.0F * unit) * size_y;
+  const Real bound =
+      larger(Real(2.0F) * (error_x * (across_y + error_y) + error_y * across_x), Real(smallest));
+  const Real least = smaller(a, smaller(b, c));
+  const Real most = larger(a, larger(b, c));
   return least < -bound && most > bound;
 }
 
@@ -114,11 +115,12 @@ ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& cor
   if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
 
   constexpr float slack = 1.0F / 4194304.0F;  // 2^-22, more than rounding t to float takes
-  const float t = static_cast<float>(crossing.t.value);
-  const float limit = t + slack * magnitude(t) + 1.0e-37F;
-  const float u = static_cast<float>(crossing.u.value);
-  const float v = static_cast<float>(crossing.v.value);
-  best = {crossing.t, limit, callers_t, u + 0.0F, v + 0.0F, id};  // adding +0 turns -0 into +0
+  const Real t = static_cast<float>(crossing.t.value);
+  const Real limit = t + Real(slack) * magnitude(t) + Real(1.0e-37F);
+  const Real zero = 0.0F;  // adding +0 turns -0 into +0
+  const Real u = Real(static_cast<float>(crossing.u.value)) + zero;
+  const Real v = Real(static_cast<float>(crossing.v.value)) + zero;
+  best = {crossing.t, limit, callers_t, u.value, v.value, id};
   return true;
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A ray made ready for one tree: brought to the scale and the neighbourhood of the scene, so that
-// what follows may be done in single precision. Brute force prepares its rays in the same way.
+// what follows may be done in single precision. Brute force prepares its rays in the same way. For
+// device code and the library: see arithmetic.hpp.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +35,7 @@ struct PreparedRay {
   Wide wide_shear[3];       ///< shear likewise, and 1 / direction[kz]
   bool moved = false;
   std::uint32_t k[3];
-  std::uint32_t negative[3];  ///< 1: the direction is negative along this axis
+  std::uint32_t negative_axes = 0;  ///< bit a: the direction is negative along axis a
 
   // t in tree space, counted from `origin`, becomes the caller's by (t + t_shift) * t_scale.
   Wide t_shift = 0.0;
@@ -61,7 +62,7 @@ struct PreparedRay {
     // space; both are exact in double.
     const int direction_exponent = exponent_of(static_cast<double>(longest));
     const Wide direction_scale = power_of_two(-direction_exponent);
-    const Wide wide_scale = static_cast<double>(tree.scale());
+    const Wide wide_scale = static_cast<double>(scale.value);
     t_scale = direction_scale / wide_scale;
     const Wide to_tree = Wide(power_of_two(direction_exponent)) * wide_scale;
 
@@ -69,65 +70,72 @@ struct PreparedRay {
     Wide direction[3];
     Wide low[3];
     Wide high[3];
-    double coordinate = 0.0;
-    double distance = 0.0;
+    const Box& bounds = tree.header->bounds;  // a tree that is not empty has a header
+    Wide coordinate = 0.0;
+    Wide distance = 0.0;
     for (int a = 0; a < 3; ++a) {
       from[a] = Wide(static_cast<double>(origin_in[a])) * wide_scale;
       direction[a] = Wide(static_cast<double>(direction_in[a])) * direction_scale;
-      low[a] = Wide(static_cast<double>(tree.bounds().lo[a])) * wide_scale;
-      high[a] = Wide(static_cast<double>(tree.bounds().hi[a])) * wide_scale;
-      coordinate = larger(coordinate, larger(magnitude(low[a].value), magnitude(high[a].value)));
-      distance = larger(distance, larger((low[a] - from[a]).value, (from[a] - high[a]).value));
+      low[a] = Wide(static_cast<double>(bounds.lo[a])) * wide_scale;
+      high[a] = Wide(static_cast<double>(bounds.hi[a])) * wide_scale;
+      coordinate = larger(coordinate, larger(magnitude(low[a]), magnitude(high[a])));
+      distance = larger(distance, larger(low[a] - from[a], from[a] - high[a]));
     }
-    if (distance > far_origin * coordinate && !approach(low, high, direction, from, coordinate))
+    if (distance > Wide(far_origin) * coordinate &&
+        !approach(low, high, direction, from, coordinate))
       return;
 
-    float reach = 0.0F;
-    float furthest = 0.0F;
+    Real reach = 0.0F;
+    Real furthest = 0.0F;
     for (int a = 0; a < 3; ++a) {
       origin[a] = static_cast<float>(from[a].value);
-      furthest = larger(furthest, magnitude(origin[a].value));
-      const float lo = static_cast<float>(low[a].value);
-      const float hi = static_cast<float>(high[a].value);
-      reach = larger(reach, larger(magnitude((Real(lo) - origin[a]).value),
-                                   magnitude((Real(hi) - origin[a]).value)));
+      furthest = larger(furthest, magnitude(origin[a]));
+      const Real lo = static_cast<float>(low[a].value);
+      const Real hi = static_cast<float>(high[a].value);
+      reach = larger(reach, larger(magnitude(lo - origin[a]), magnitude(hi - origin[a])));
     }
     constexpr float unit = 1.0F / 16777216.0F;
     // Boxes are tested from a moved origin that was rounded to float, the intersector's is not.
-    const Real rounding = moved ? Real(2.0F * unit) * Real(furthest) : Real(0.0F);
-    const Real half_width = Real(slab_units * unit) * Real(reach) + rounding;
+    const Real rounding = moved ? Real(2.0F * unit) * furthest : Real(0.0F);
+    const Real half_width = Real(slab_units * unit) * reach + rounding;
 
     Real d[3];
     for (int a = 0; a < 3; ++a) {
       d[a] = static_cast<float>(direction[a].value);
-      negative[a] = d[a] < Real(0.0F) ? 1 : 0;
+      const bool negative = d[a] < Real(0.0F);
+      if (negative) negative_axes |= 1u << a;
       // A component below 2^-100 moves a ray by less than half_width anywhere near the scene, but
       // its true inverse could make 0 * infinity.
       constexpr float largest_inverse = 1.2676506e30F;  // 2^100
-      inverse[a] = magnitude(d[a].value) > 1.0F / largest_inverse
+      inverse[a] = magnitude(d[a]) > Real(1.0F / largest_inverse)
                        ? Real(1.0F) / d[a]
-                       : Real(negative[a] != 0 ? -largest_inverse : largest_inverse);
-      padding[a] = half_width * Real(magnitude(inverse[a].value));
+                       : Real(negative ? -largest_inverse : largest_inverse);
+      padding[a] = half_width * magnitude(inverse[a]);
     }
-    k[2] = magnitude(d[0].value) >= magnitude(d[1].value)
-               ? (magnitude(d[0].value) >= magnitude(d[2].value) ? 0 : 2)
-               : (magnitude(d[1].value) >= magnitude(d[2].value) ? 1 : 2);
+    k[2] = magnitude(d[0]) >= magnitude(d[1]) ? (magnitude(d[0]) >= magnitude(d[2]) ? 0 : 2)
+                                              : (magnitude(d[1]) >= magnitude(d[2]) ? 1 : 2);
     k[0] = k[2] == 2 ? 0 : k[2] + 1;
     k[1] = k[0] == 2 ? 0 : k[0] + 1;
-    wide_shear[0] = direction[k[0]] / direction[k[2]];
-    wide_shear[1] = direction[k[1]] / direction[k[2]];
-    wide_shear[2] = Wide(1.0) / direction[k[2]];
+    const Wide longest_component = element(direction, k[2]);
+    wide_shear[0] = element(direction, k[0]) / longest_component;
+    wide_shear[1] = element(direction, k[1]) / longest_component;
+    wide_shear[2] = Wide(1.0) / longest_component;
     for (int i = 0; i < 2; ++i) shear[i] = static_cast<float>(wide_shear[i].value);
     for (int i = 0; i < 3; ++i) {
-      permuted_origin[i] = origin[k[i]];
-      wide_origin[i] = from[k[i]];
-      permuted_rest[i] =
-          static_cast<float>((from[k[i]] - Wide(static_cast<double>(origin[k[i]].value))).value);
+      permuted_origin[i] = element(origin, k[i]);
+      wide_origin[i] = element(from, k[i]);
+      const Wide rounded = static_cast<double>(permuted_origin[i].value);
+      permuted_rest[i] = static_cast<float>((wide_origin[i] - rounded).value);
     }
 
     first = bound(t_min, to_tree, -1.0);
     last = bound(t_max, to_tree, 1.0);
     valid = true;
+  }
+
+  /// Whether the direction is negative along this axis.
+  [[nodiscard]] ZKD_HOST_DEVICE bool is_negative(std::uint32_t axis) const {
+    return ((negative_axes >> axis) & 1u) != 0;
   }
 
   /// Coordinate k[i] of a corner, in tree space, from the ray's origin.
@@ -150,37 +158,37 @@ struct PreparedRay {
   /// Moves `from` along the ray to the point nearest to the scene's centre. False: that point is so
   /// far out that the ray passes the scene.
   ZKD_HOST_DEVICE bool approach(const Wide (&low)[3], const Wide (&high)[3],
-                                const Wide (&direction)[3], Wide (&from)[3], double coordinate) {
-    Wide along = 0.0;
+                                const Wide (&direction)[3], Wide (&from)[3], Wide coordinate) {
+    Wide projected = 0.0;
     Wide squared = 0.0;
     for (int a = 0; a < 3; ++a) {
       const Wide to_centre = (low[a] + high[a]) * Wide(0.5) - from[a];
-      along = along + to_centre * direction[a];
+      projected = projected + to_centre * direction[a];
       squared = squared + direction[a] * direction[a];
     }
     moved = true;
-    t_shift = along / squared;
+    t_shift = projected / squared;
     for (int a = 0; a < 3; ++a) {
       from[a] = from[a] + t_shift * direction[a];
-      if (!(magnitude(from[a].value) <= 16.0 * coordinate)) return false;
+      if (!(magnitude(from[a]) <= Wide(16.0) * coordinate)) return false;
     }
     return true;
   }
 
   /// An end of the interval in tree space, moved outward by more than the rounding of t.
-  [[nodiscard]] ZKD_HOST_DEVICE Real bound(float t, Wide to_tree, double outward) const {
+  [[nodiscard]] ZKD_HOST_DEVICE Real bound(float t, Wide to_tree, Wide outward) const {
     if (!is_finite(t)) return t;
     const Wide end = Wide(static_cast<double>(t)) * to_tree;
     // The t that is compared with it was rounded to float once, and in the caller's units: by a
     // relative error or, where it is denormal, by an absolute one.
-    constexpr double relative = 1.0 / 4194304.0;  // 2^-22
-    const double absolute = power_of_two(-149) * to_tree.value;
-    const double reached =
-        (end - t_shift).value + outward * (relative * magnitude(end.value) + absolute + 1.0e-30);
+    const Wide relative = 1.0 / 4194304.0;  // 2^-22
+    const Wide absolute = Wide(power_of_two(-149)) * to_tree;
+    const Wide reached =
+        (end - t_shift) + outward * (relative * magnitude(end) + absolute + Wide(1.0e-30));
     constexpr double float_max = 3.4028234663852886e38;
-    if (reached > float_max) return 3.4028234663852886e38F;
-    if (reached < -float_max) return -3.4028234663852886e38F;
-    return static_cast<float>(reached);
+    if (reached > Wide(float_max)) return 3.4028234663852886e38F;
+    if (reached < Wide(-float_max)) return -3.4028234663852886e38F;
+    return static_cast<float>(reached.value);
   }
 };
 

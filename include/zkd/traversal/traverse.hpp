@@ -4,7 +4,8 @@
 // it lies in the ray's interval.
 //
 // Nothing here decides an answer: a box only says what may be left out. Closest hit is the nearest
-// of all candidates in the leaves visited, in whatever order; so the walk may use fast arithmetic.
+// of all candidates in the leaves visited, in whatever order; so a backend may test boxes with its
+// own arithmetic, within their padding. For device code and the library: see arithmetic.hpp.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +13,7 @@
 #include <zkd/query.hpp>
 #include <zkd/traversal/intersect.hpp>
 #include <zkd/traversal/ray.hpp>
+#include <zkd/traversal/triangle.hpp>
 #include <zkd/tree.hpp>
 
 namespace zkd::core {
@@ -22,18 +24,21 @@ struct Entries {
   std::uint32_t hit;  ///< bit 0: child 0, bit 1: child 1
 };
 
-/// A ray against the two boxes of a node. A backend may bring its own.
+/// A ray against the two boxes of a node. A backend may bring its own, and its own way to read a
+/// node.
 class BoxTest {
  public:
   ZKD_HOST_DEVICE explicit BoxTest(const PreparedRay& ray) : ray_(ray) {}
+
+  [[nodiscard]] static ZKD_HOST_DEVICE const Node& read(const Node& node) { return node; }
 
   /// `last`: nothing behind it is of interest any more.
   ZKD_HOST_DEVICE Entries operator()(const Node& node, Real last) const {
     Real near[2] = {ray_.first, ray_.first};
     Real far[2] = {last, last};
-    for (int a = 0; a < 3; ++a) {
-      const float* at_near = node.bounds[a] + 2 * ray_.negative[a];
-      const float* at_far = node.bounds[a] + 2 - 2 * ray_.negative[a];
+    for (std::uint32_t a = 0; a < 3; ++a) {
+      const float* at_near = node.bounds[a] + (ray_.is_negative(a) ? 2 : 0);
+      const float* at_far = node.bounds[a] + (ray_.is_negative(a) ? 0 : 2);
       for (int child = 0; child < 2; ++child) {
         near[child] =
             larger(near[child],
@@ -55,7 +60,7 @@ template <bool any, class Boxes>
 ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleView& triangles,
                                           const PreparedRay& ray, TraversalCost* cost) {
   const Boxes boxes(ray);
-  struct Waiting {  // without initialisers: a stack of them costs nothing
+  struct alignas(8) Waiting {  // without initialisers: a stack of them costs nothing
     std::uint32_t link;
     float t;
   };
@@ -70,17 +75,17 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
     bool reached = true;
     while (!link.is_leaf()) {
       ++node_visits;
-      const Node& node = tree.nodes[link.index()];
+      const auto& node = Boxes::read(tree.nodes[link.index()]);
       const Real last = smaller(ray.last, best.limit);
       const Entries entries = boxes(node, last);
       if (entries.hit == 3) {
         const bool upper_first = entries.t[1] < entries.t[0] ||
-                                 (entries.t[1] == entries.t[0] && ray.negative[node.axis] != 0);
+                                 (entries.t[1] == entries.t[0] && ray.is_negative(node.axis));
         const std::uint32_t near = upper_first ? 1 : 0;
-        stack[waiting++] = {node.child[1 - near].bits, entries.t[1 - near]};
-        link = node.child[near];
+        stack[waiting++] = {element(node.child, 1 - near).bits, element(entries.t, 1 - near)};
+        link = element(node.child, near);
       } else if (entries.hit != 0) {
-        link = node.child[entries.hit - 1];
+        link = element(node.child, entries.hit - 1);
       } else {
         reached = false;
         break;
@@ -116,6 +121,21 @@ ZKD_HOST_DEVICE inline Candidate trace(const TreeView& tree, const TriangleView&
   if (prepared.valid) return traverse<any, Boxes>(tree, triangles, prepared, cost);
   if (cost != nullptr) *cost = {};
   return {};
+}
+
+/// The nearest hit by a loop over all triangles. A ray is prepared by the tree's bounds and scale,
+/// as for a walk.
+ZKD_HOST_DEVICE inline Candidate trace_brute_force(const TreeView& tree,
+                                                   const TriangleView& triangles, const Ray& ray) {
+  const PreparedRay prepared(tree, ray);
+  Candidate best;
+  for (std::uint32_t id = 0; prepared.valid && id < triangles.triangle_count; ++id) {
+    const Corners corners = corners_of(triangles, id);
+    Candidate candidate = best;
+    // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
+    if (intersect(prepared, corners, id, candidate) && is_valid(corners)) best = candidate;
+  }
+  return best;
 }
 
 ZKD_HOST_DEVICE inline Hit to_hit(const Candidate& candidate) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One triangle and its box: corners, centre, whether it has an area.
+// One triangle and its box: corners, centre, whether it has an area. For device code and the
+// library: see arithmetic.hpp.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +22,9 @@ ZKD_HOST_DEVICE inline void include(Box& box, const Box& other) {
 
 /// Centre of a box along one axis: exact in double but for floats 2^29 times apart.
 ZKD_HOST_DEVICE inline double centre(const Box& box, int a) {
-  return (static_cast<double>(box.lo[a]) + static_cast<double>(box.hi[a])) * 0.5;
+  const Wide lo = static_cast<double>(box.lo[a]);
+  const Wide hi = static_cast<double>(box.hi[a]);
+  return ((lo + hi) * Wide(0.5)).value;
 }
 
 /// The corners of one triangle.
@@ -44,34 +47,34 @@ ZKD_HOST_DEVICE inline bool all_finite(const Corners& c) {
 
 /// Whether the sum of six doubles is exactly zero, by keeping every rounding error (Shewchuk 1997,
 /// grow-expansion: after each step the components add up to the exact sum and do not overlap).
-ZKD_HOST_DEVICE inline bool sums_to_zero(const double (&terms)[6]) {
-  double expansion[6];
+ZKD_HOST_DEVICE inline bool sums_to_zero(const Wide (&terms)[6]) {
+  Wide expansion[6];
   int length = 0;
-  for (const double term : terms) {
-    double carry = term;
+  for (const Wide term : terms) {
+    Wide carry = term;
     for (int i = 0; i < length; ++i) {
-      const double sum = carry + expansion[i];
-      const double virtual_part = sum - carry;
+      const Wide sum = carry + expansion[i];
+      const Wide virtual_part = sum - carry;
       expansion[i] = (carry - (sum - virtual_part)) + (expansion[i] - virtual_part);
       carry = sum;
     }
     expansion[length++] = carry;
   }
   for (int i = 0; i < length; ++i)
-    if (expansion[i] != 0.0) return false;
+    if (expansion[i].value != 0.0) return false;
   return true;
 }
 
 /// Twice the signed area of the triangle's projection along one axis: is it exactly zero?
 /// The products of two floats are exact in double.
-ZKD_HOST_DEVICE inline bool projection_has_zero_area(double ax, double ay, double bx, double by,
-                                                     double cx, double cy) {
-  const double left = (bx - ax) * (cy - ay);
-  const double right = (by - ay) * (cx - ax);
+ZKD_HOST_DEVICE inline bool projection_has_zero_area(Wide ax, Wide ay, Wide bx, Wide by, Wide cx,
+                                                     Wide cy) {
+  const Wide left = (bx - ax) * (cy - ay);
+  const Wide right = (by - ay) * (cx - ax);
   // Shewchuk's bound for the sign of the difference, (3 + 16 u) u with u = 2^-53.
-  const double bound = 3.3306690738754716e-16 * (magnitude(left) + magnitude(right));
+  const Wide bound = Wide(3.3306690738754716e-16) * (magnitude(left) + magnitude(right));
   if (magnitude(left - right) > bound) return false;
-  const double terms[6] = {ax * by, -(ay * bx), bx * cy, -(by * cx), cx * ay, -(cy * ax)};
+  const Wide terms[6] = {ax * by, -(ay * bx), bx * cy, -(by * cx), cx * ay, -(cy * ax)};
   return sums_to_zero(terms);
 }
 

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// PNG through OpenImageIO.
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "scene/image.hpp"
+
+namespace zkd::scene {
+namespace {
+
+/// [0, 1], NaN as 0.
+float clamped(float x) { return x > 0.0F ? std::min(x, 1.0F) : 0.0F; }
+
+std::uint8_t to_srgb(float linear) {
+  const float x = clamped(linear);
+  const float encoded = x <= 0.0031308F ? 12.92F * x : 1.055F * std::pow(x, 1.0F / 2.4F) - 0.055F;
+  return static_cast<std::uint8_t>(encoded * 255.0F + 0.5F);
+}
+
+}  // namespace
+
+bool can_write_png() noexcept { return true; }
+
+void write_png(const std::filesystem::path& file, unsigned width, unsigned height,
+               std::span<const glm::vec3> rgb) {
+  if (width == 0 || height == 0 || rgb.size() != std::size_t{width} * height) {
+    throw std::invalid_argument(file.string() + ": " + std::to_string(rgb.size()) +
+                                " pixels for an image of " + std::to_string(width) + " x " +
+                                std::to_string(height));
+  }
+  if (file.has_parent_path()) {
+    std::error_code error;
+    std::filesystem::create_directories(file.parent_path(), error);
+    if (error) throw std::runtime_error(file.string() + ": " + error.message());
+  }
+
+  std::vector<std::uint8_t> pixels;
+  pixels.reserve(3 * rgb.size());
+  for (const glm::vec3& colour : rgb) {
+    for (int channel = 0; channel < 3; ++channel) pixels.push_back(to_srgb(colour[channel]));
+  }
+
+  const auto fail = [&file](const std::string& words) {
+    const std::size_t end = words.find('\n');
+    throw std::runtime_error(file.string() + ": cannot be written: " + words.substr(0, end));
+  };
+  // By format, not by name: the file is a PNG whatever it is called.
+  const auto output = OIIO::ImageOutput::create("png");
+  if (!output) fail(OIIO::geterror());
+  OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("oiio:ColorSpace", "sRGB");
+  if (!output->open(file.string(), spec)) fail(output->geterror());
+  if (!output->write_image(OIIO::TypeDesc::UINT8, pixels.data())) fail(output->geterror());
+  if (!output->close()) fail(output->geterror());
+}
+
+}  // namespace zkd::scene

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Trees that never change: hashes of generated scenes, pinned. They are the same on every machine,
+// compiler and backend; the scenes are made of integers and correctly rounded operations alone
+// (scene/generate.hpp). A change of the format or of the algorithm changes them knowingly: then a
+// failing test prints what to put here, and the properties of the new trees say whether it may.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <ostream>
+#include <string>
+
+#include <zkd/options.hpp>
+#include <zkd/tree.hpp>
+
+#include "scene/generate.hpp"
+#include "support/platform.hpp"
+#include "verify/properties.hpp"
+#include "verify/tree_hash.hpp"
+
+namespace zkd {
+namespace {
+
+struct Golden {
+  const char* name;
+  scene::Mesh (*make)();
+  const char* once;
+  const char* all;
+};
+
+void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
+
+const Golden goldens[] = {
+    {"Soup", [] { return scene::soup(20000, 1); }, "1fcb3efccc2f6161496505d512667edf",
+     "7c6ad8855e8356e4a44547568dd02157"},
+    {"Sphere", [] { return scene::sphere(5); }, "8ee8c1074aff066bd88fbe96ea5a274e",
+     "dcac50f573ce09b72377b0259a91e101"},
+    {"Grid", [] { return scene::grid(12); }, "16e965475c54676b35351482cf0f633e",
+     "80df98bbe75cfc225cebeffe9bfe4eb2"},
+    {"Slivers", [] { return scene::slivers(2000, 1e3F, 2); }, "fc4fea2410f571d213dd00ec9ccda4d5",
+     "3376d4d97f11fe2cb9fce4acb0dd5a1f"},
+    {"Needles", [] { return scene::needles(300, 3); }, "e19a971e3cb5675ed3623388c8cf0411",
+     "4c16a763d9855865dfea733847ff27cd"},
+    {"Flat", [] { return scene::flat(3000, 1, 4); }, "5fcac21c8862eeb6691a4c0ff3673bc1",
+     "6a1fe9ac5ed40d6691634312a101ebd9"},
+    {"Fan", [] { return scene::fan(1000); }, "8e12dcbaa6d0c168cc9d3a8efd149a82",
+     "078f56e894c11bd25e9b301201cde03c"},
+    {"Identical", [] { return scene::identical(1000); }, "2bbf14a0ef07af798b0fe443c92691ee",
+     "2bbf14a0ef07af798b0fe443c92691ee"},
+    {"SameCentre", [] { return scene::same_centre(2000, 5); }, "97ed6634d80b29c255b1b5650b948629",
+     "97ed6634d80b29c255b1b5650b948629"},
+    {"SmallInLarge", [] { return scene::small_in_large(10000, 1e6F, 6); },
+     "eabfd2eabf1ce6d22a0ed8992ab49f4b", "a2e308a7b4674e05902eeb8d6d8fcf37"},
+    {"Staircase", [] { return scene::staircase(300); }, "ddc4d7b4de252b7ad9d3664cf54b4521",
+     "d592ca5ceada2b60564ea87982d33ae0"},
+    {"RandomBits", [] { return scene::random_bits(500, 7); }, "9a0a5dbdbd1486301c9275ef1cb00623",
+     "6b971bef87fe20555fd5e24e28a9d013"},
+    {"FarAway",
+     [] {
+       return scene::offset(scene::soup(3000, 8), {1e6F, -3e5F, 0.0F});
+     },
+     "74d0672c54e60267d5ba77f456543f35", "1706c747c3d5aa3fecaeaa789d95d56c"},
+    {"Tiny", [] { return scene::scaled(scene::sphere(3), -130); },
+     "406b512e4ffc962a8b912900a08758cd", "c576975c24d79ef5db69b97d1ba38a42"},
+};
+
+class GoldenTrees : public testing::TestWithParam<Golden> {};
+
+TEST_P(GoldenTrees, HaveTheirHash) {
+  const scene::Mesh mesh = GetParam().make();
+  for (const References references : {References::once, References::all}) {
+    const Tree tree = test::build(
+        mesh.view(), {.references = references, .invalid_triangles = InvalidTriangles::skip});
+    EXPECT_EQ(verify::tree_hash(tree.view()),
+              references == References::once ? GetParam().once : GetParam().all)
+        << to_string(references);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, GoldenTrees, testing::ValuesIn(goldens),
+                         [](const auto& golden) { return std::string(golden.param.name); });
+
+// What a hash stands for is a right tree.
+TEST(GoldenTree, TwoAreRight) {
+  for (const scene::Mesh& mesh : {goldens[1].make(), goldens[9].make()}) {
+    for (const References references : {References::once, References::all}) {
+      const Tree tree = test::build(mesh.view(), {.references = references});
+      for (const std::string& violation : verify::check_tree(tree, mesh.view()))
+        ADD_FAILURE() << to_string(references) << ": " << violation;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace zkd

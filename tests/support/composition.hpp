@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// All eleven stages on the platform, one after the other, each fed with what the one before it
+// made.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <zkd/geometry.hpp>
+#include <zkd/lattice.hpp>
+#include <zkd/options.hpp>
+#include <zkd/stages.hpp>
+#include <zkd/tree.hpp>
+
+#include "support/platform.hpp"
+
+namespace zkd::test {
+
+/// What they found, in host memory.
+struct Composition {
+  Box bounds;
+  Lattice lattice;
+  std::uint32_t crowded = 0;
+  std::vector<std::uint32_t> first;  ///< of each trunk
+  Link root;
+  std::vector<Link> children;
+  std::vector<std::uint32_t> axes;
+  std::vector<float> planes;
+  std::vector<std::uint32_t> leaf_offsets;
+  std::vector<std::uint32_t> references;
+  std::vector<Node> nodes;
+};
+
+template <class T>
+std::vector<T> at_positions(const std::vector<T>& values,
+                            const std::vector<std::uint32_t>& positions) {
+  std::vector<T> picked;
+  for (const std::uint32_t position : positions) picked.push_back(values[position]);
+  return picked;
+}
+
+inline Composition compose(const Executor& executor, const TriangleView& triangles,
+                           const BuildOptions& options) {
+  Composition out;
+  const auto& uploaded = upload(triangles);
+  Array<Box> boxes(triangles.triangle_count);
+  const stages::SceneSummary scene =
+      stages::triangle_boxes(executor, uploaded, options.invalid_triangles, boxes);
+  out.bounds = scene.bounds;
+  std::uint32_t width = options.code_bits;
+  if (width == 0) width = scene.valid < (1u << 22) ? 32 : 64;
+  out.lattice = stages::make_lattice(scene.bounds, width, options.axis_order);
+
+  Array<std::uint64_t> codes(scene.valid);
+  Array<std::uint32_t> ids(scene.valid);
+  stages::morton_encode(executor, boxes, out.lattice, codes, ids);
+  (void)stages::radix_sort(executor, codes, ids, 64);
+
+  Array<stages::TrunkKey> keys(scene.valid);
+  Array<std::uint32_t> crowd(scene.valid);
+  Array<Lattice> lattices(scene.valid);
+  out.crowded =
+      stages::recode_crowded(executor, boxes, out.lattice, codes, ids, options.leaf_size,
+                             options.axis_order, options.recode_crowded, keys, crowd, lattices);
+  Array<std::uint32_t> found(scene.valid);
+  const std::uint32_t trunks = stages::find_trunks(executor, keys, options.leaf_size, found);
+  out.first = found.download();
+  out.first.resize(trunks);
+
+  const std::size_t node_count = std::max<std::size_t>(trunks, 1) - 1;
+  const Array<stages::TrunkKey> trunk_keys = upload(at_positions(keys.download(), out.first));
+  Array<std::uint8_t> levels(node_count);
+  stages::essential_nodes(executor, trunk_keys, levels);
+  Array<Link> children(2 * node_count);
+  out.root = stages::path_compression(executor, trunk_keys, levels, children);
+  out.children = children.download();
+  Array<std::uint32_t> axes(node_count);
+  Array<float> planes(node_count);
+  stages::split_planes(executor, trunk_keys, levels,
+                       upload(at_positions(crowd.download(), out.first)), out.lattice, lattices,
+                       axes, planes);
+  out.axes = axes.download();
+  out.planes = planes.download();
+
+  const Array<std::uint32_t> first = upload(out.first);
+  const stages::Skeleton skeleton{ids, first, levels, children, out.root, axes, planes};
+  Array<std::uint32_t> leaf_offsets(trunks + std::size_t{1});
+  Array<std::uint32_t> none(0);
+  const std::uint64_t needed = stages::list_references(
+      executor, uploaded, boxes, skeleton, out.lattice, options.references, leaf_offsets, none);
+  Array<std::uint32_t> references(needed);
+  (void)stages::list_references(executor, uploaded, boxes, skeleton, out.lattice,
+                                options.references, leaf_offsets, references);
+  out.leaf_offsets = leaf_offsets.download();
+  out.references = references.download();
+  Array<Node> nodes(node_count);
+  stages::tight_boxes(executor, boxes, skeleton, options.references, leaf_offsets, references,
+                      nodes);
+  out.nodes = nodes.download();
+  return out;
+}
+
+}  // namespace zkd::test

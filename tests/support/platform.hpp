@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where the tests run. The same test source is compiled once for each platform: the CPU, a CUDA
+// device (ZKD_TEST_CUDA), or the CUDA backend's logic on the host (ZKD_TEST_SIMULATED). Each
+// offers, in zkd::test:
+//
+//   Executor                  what stages are called with
+//   executor(threads)         one; only the CPU has threads
+//   executors(most)           one for each number of threads up to `most`; elsewhere one
+//   all_executors(most)       the same for every instruction set
+//   name(executor)            for messages
+//   Array<T>                  values where the platform's stages find them: made of a length or of
+//                             host values, passed as a span, brought back by download()
+//   upload(...)               an Array of these values; a TriangleView that may be passed to stages
+//   build(triangles, options)            a tree in host memory
+//   closest_hits(tree, triangles, rays)  traced on the platform; all in host memory
+//   thinning                  where a call costs launches and waits, tests with thousands of tiny
+//                             calls make one in so many
+//   sort_leaves_passes_out    whether stages::radix_sort looks for passes that are not needed
+#pragma once
+
+#if defined(ZKD_TEST_CUDA)
+#include "support/platform_cuda.hpp"  // IWYU pragma: export
+#elif defined(ZKD_TEST_SIMULATED)
+#include "support/platform_simulated.hpp"  // IWYU pragma: export
+#else
+#include "support/platform_cpu.hpp"  // IWYU pragma: export
+#endif
