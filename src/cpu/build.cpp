@@ -11,8 +11,8 @@
 #include "core/cuda_entry.hpp"
 #include "core/outcome.hpp"
 #include "core/pipeline.hpp"
+#include "core/quality.hpp"
 #include "cpu/backend.hpp"
-#include "cpu/quality.hpp"
 
 namespace zkd {
 namespace {
@@ -29,7 +29,7 @@ Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const Buil
   statistics.stage_ms = backend.stage_ms();
   const TreeView view{backend.header(), backend.nodes(), backend.leaf_offsets(),
                       backend.references()};
-  if (options.measure_quality) cpu::measure_quality(view, statistics);
+  if (options.measure_quality) core::measure_quality(view, statistics);
   return TreeAssembler::assemble(view, state, core::used_options(state, options, Backend::cpu),
                                  statistics, backend.tree_block(), backend.reference_block());
 }

@@ -11,9 +11,9 @@
 #include <zkd/tree.hpp>
 
 #include "core/outcome.hpp"
+#include "core/quality.hpp"
 #include "core/status.hpp"
 #include "cpu/memory.hpp"
-#include "cpu/quality.hpp"
 #include "cuda/build_steps.hpp"
 
 namespace zkd::cuda {
@@ -61,7 +61,7 @@ zkd::Tree copy_to_host(Device& device, const Tree& tree, const core::BuildState*
   const TreeView view{arrays.header, arrays.nodes, arrays.leaf_offsets,
                       static_cast<const std::uint32_t*>(reference_block.data())};
   Statistics statistics = statistics_of(tree, state, workspace_bytes);
-  if (tree.options().measure_quality) cpu::measure_quality(view, statistics);
+  if (tree.options().measure_quality) core::measure_quality(view, statistics);
   return TreeAssembler::assemble(view, state,
                                  core::used_options(state, tree.options(), zkd::Backend::cuda),
                                  statistics, tree_block, reference_block);

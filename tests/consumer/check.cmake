@@ -79,8 +79,12 @@ elseif(CASE STREQUAL "other_flags")
 elseif(CASE STREQUAL "add_subdirectory")
   # Another way of building all of it: shared, without optimisation, assertions on.
   configure_and_build("${sources}/add_subdirectory" "-DZKD_SOURCE_DIR=${ZKD_SOURCE_DIR}"
-                      -DBUILD_SHARED_LIBS=ON -DCMAKE_BUILD_TYPE=Debug)
+                      -DBUILD_SHARED_LIBS=ON -DCMAKE_BUILD_TYPE=Debug
+                      "-DZKD_CUDA_ARCHITECTURES=75-real")
   run_bits()
+  if(EXISTS "${build}/either")
+    step("running either" "${build}/either")
+  endif()
 
 else()
   message(FATAL_ERROR "no such case: ${CASE}")

@@ -6,9 +6,9 @@
 #include <zkd/statistics.hpp>
 #include <zkd/tree.hpp>
 
-namespace zkd::cpu {
+namespace zkd::core {
 
 /// Fills Statistics::depth, ::largest_leaf and ::sah_cost. One walk over the tree, one thread.
-void measure_quality(const TreeView& tree, Statistics& statistics) noexcept;
+ZKD_API void measure_quality(const TreeView& tree, Statistics& statistics) noexcept;
 
-}  // namespace zkd::cpu
+}  // namespace zkd::core

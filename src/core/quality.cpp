@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One walk over a finished tree that adds up the terms of its SAH cost.
-#include "cpu/quality.hpp"
+#include "core/quality.hpp"
 
 #include <algorithm>
 
 #include "core/key.hpp"
 
-namespace zkd::cpu {
+namespace zkd::core {
 namespace {
 
 double half_area(const float (&lo)[3], const float (&hi)[3]) {
@@ -66,4 +66,4 @@ void measure_quality(const TreeView& tree, Statistics& statistics) noexcept {
   statistics.sah_cost = whole > 0.0 ? cost / whole : 0.0;
 }
 
-}  // namespace zkd::cpu
+}  // namespace zkd::core
