@@ -12,6 +12,7 @@
 
 #include "support/hits.hpp"
 #include "support/meshes.hpp"
+#include "support/platform_tree.hpp"
 #include "support/rays.hpp"
 
 namespace zkd {
@@ -26,21 +27,19 @@ struct Count {
   std::uint64_t hits = 0;
 };
 
-// Every form of a query, on both instruction sets, against brute force.
-void expect_same_answers(const Tree& tree, const TriangleView& triangles,
+// Every form of a query, where the tree is and in host memory, against brute force there.
+void expect_same_answers(const test::PlatformTree& tree, const TriangleView& triangles,
                          const std::vector<Ray>& rays, Count& count) {
+  const TreeView& on_host = tree.host().view();
   const std::vector<Hit> want = test::brute_force(
-      tree.view(), triangles, rays, {.threads = 1, .instructions = cpu::InstructionSet::portable});
+      on_host, triangles, rays, {.threads = 1, .instructions = cpu::InstructionSet::portable});
   count.rays += rays.size();
-  for (const auto set : {cpu::InstructionSet::portable, cpu::InstructionSet::avx2}) {
-    const cpu::Executor executor{.threads = 2, .instructions = set};
-    const std::vector<Hit> loop = test::brute_force(tree.view(), triangles, rays, executor);
-    std::vector<TraversalCost> costs(rays.size());
-    std::vector<Hit> hits(rays.size());
-    closest_hit(executor, tree.view(), triangles, rays, hits, costs);
-    std::vector<std::uint8_t> occluded(rays.size(), 7);
-    any_hit(executor, tree.view(), triangles, rays, occluded);
-    const char* name = set == cpu::InstructionSet::avx2 ? "avx2" : "portable";
+  for (const test::Walk walk : test::walks()) {
+    const std::vector<Hit> loop = tree.brute_force_hits(rays, walk);
+    std::vector<TraversalCost> costs;
+    const std::vector<Hit> hits = tree.closest_hits(rays, walk, &costs);
+    const std::vector<std::uint8_t> occluded = tree.any_hits(rays, walk);
+    const char* name = test::name(walk);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       ASSERT_TRUE(same_bits(loop[i], want[i]))
           << "brute force itself, " << name << ", ray " << i << " " << print(rays[i]) << ": "
@@ -54,10 +53,10 @@ void expect_same_answers(const Tree& tree, const TriangleView& triangles,
     }
   }
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Hit hit = or_miss(closest_hit(tree.view(), triangles, rays[i]));
+    const Hit hit = or_miss(closest_hit(on_host, triangles, rays[i]));
     ASSERT_TRUE(same_bits(hit, want[i])) << "single ray " << i << " " << print(rays[i]) << ": "
                                          << print(hit) << " instead of " << print(want[i]);
-    ASSERT_EQ(any_hit(tree.view(), triangles, rays[i]), test::is_hit(want[i]))
+    ASSERT_EQ(any_hit(on_host, triangles, rays[i]), test::is_hit(want[i]))
         << "single any hit, ray " << i << " " << print(rays[i]);
     count.hits += test::is_hit(want[i]) ? 1 : 0;
   }
@@ -80,11 +79,11 @@ TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
     for (const References references : {References::once, References::all}) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references));
-      const Tree tree = build(m.mesh.view(), options_for(references, seed));
-      test::RayMaker maker(m.mesh, tree.view(), seed);
+      const test::PlatformTree tree(m.mesh.view(), options_for(references, seed));
+      test::RayMaker maker(m.mesh, tree.host().view(), seed);
       std::vector<Ray> rays = maker.all_kinds(720);
       for (const std::vector<Ray>& more :
-           {scene::random_rays(tree.view().bounds(), 100, seed),
+           {scene::random_rays(tree.host().view().bounds(), 100, seed),
             scene::rays_at_features(m.mesh, 100, seed), scene::axis_rays(m.mesh, 100, seed)}) {
         rays.insert(rays.end(), more.begin(), more.end());
       }
@@ -102,19 +101,21 @@ TEST_P(QueryBruteForce, EndsOfTheIntervalAtTheHit) {
   const test::NamedMesh m = test::small_mesh(GetParam().number, 50);
   for (const References references : {References::once, References::all}) {
     SCOPED_TRACE(m.name + ", " + to_string(references));
-    const Tree tree = build(m.mesh.view(), options_for(references, 50));
+    const test::PlatformTree tree(m.mesh.view(), options_for(references, 50));
+    const std::vector<Ray> whole = test::RayMaker(m.mesh, tree.host().view(), 50).all_kinds(400);
+    const std::vector<Hit> hits = tree.closest_hits(whole);
     std::vector<Ray> rays;
-    for (Ray ray : test::RayMaker(m.mesh, tree.view(), 50).all_kinds(400)) {
-      const auto hit = closest_hit(tree.view(), m.mesh.view(), ray);
-      if (!hit) continue;
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      if (!test::is_hit(hits[i])) continue;
+      Ray ray = whole[i];
       for (int end = 0; end < 2; ++end) {
         for (int step = -1; step <= 1; ++step) {
           Ray cut = ray;
-          (end == 0 ? cut.t_min : cut.t_max) = test::ulps(hit->t, step);
+          (end == 0 ? cut.t_min : cut.t_max) = test::ulps(hits[i].t, step);
           rays.push_back(cut);
         }
       }
-      ray.t_min = ray.t_max = hit->t;
+      ray.t_min = ray.t_max = hits[i].t;
       rays.push_back(ray);
     }
     expect_same_answers(tree, m.mesh.view(), rays, count);
@@ -130,8 +131,8 @@ TEST(QueryBruteForce, LargerScenes) {
   for (const References references : {References::once, References::all}) {
     for (const scene::Mesh& mesh : {scene::soup(5000, 60), scene::sphere(4), scene::grid(7),
                                     scene::small_in_large(3000, 1e6F, 60), scene::fan(5000)}) {
-      const Tree tree = build(mesh.view(), {.references = references});
-      expect_same_answers(tree, mesh.view(), test::RayMaker(mesh, tree.view(), 61).all_kinds(480),
+      const test::PlatformTree tree(mesh.view(), {.references = references});
+      expect_same_answers(tree, mesh.view(), test::RayMaker(mesh, tree.host().view(), 61).all_kinds(480),
                           count);
       if (testing::Test::HasFatalFailure()) return;
     }

@@ -3,14 +3,13 @@
 // Bugs that were found once, each as a named test.
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <vector>
 
-#include <zkd/stages.hpp>
 #include <zkd/zkd.hpp>
 
 #include "scene/random.hpp"
 #include "support/hits.hpp"
+#include "support/platform_tree.hpp"
 
 namespace zkd {
 namespace {
@@ -28,7 +27,7 @@ TEST(QueryFound, FarOriginsOfScenesAwayFromZero) {
     }
     const TriangleView view{std::span<const glm::vec3>(corners)};
     for (const References references : {References::once, References::all}) {
-      const Tree tree = build(view, {.references = references, .leaf_size = 1});
+      const test::PlatformTree tree(view, {.references = references, .leaf_size = 1});
       std::vector<Ray> rays;
       for (int i = 0; i < 4000; ++i) {
         const glm::vec3 target = corners[random.below(static_cast<std::uint32_t>(corners.size()))];
@@ -37,8 +36,8 @@ TEST(QueryFound, FarOriginsOfScenesAwayFromZero) {
         direction *= 20.0F * offset;
         rays.push_back({target - direction, 0.0F, direction});
       }
-      const std::vector<Hit> hits = test::closest(tree.view(), view, rays);
-      const std::vector<Hit> brute = test::brute_force(tree.view(), view, rays);
+      const std::vector<Hit> hits = tree.closest_hits(rays);
+      const std::vector<Hit> brute = tree.brute_force_hits(rays);
       std::size_t found = 0;
       for (std::size_t i = 0; i < rays.size(); ++i) {
         ASSERT_TRUE(test::same_bits(hits[i], brute[i]))
@@ -60,12 +59,13 @@ TEST(QueryFound, NearHitsOfSmallTrianglesKeepTheirT) {
   }
   corners.insert(corners.end(), {{1, 0, 0}, {1, 1, 0}, {1, 0, 1}});
   const TriangleView view{std::span<const glm::vec3>(corners)};
-  const Tree tree = build(view);
+  const test::PlatformTree tree(view);
   for (const float t_min : {0.0F, 1.0e-30F}) {
-    const auto hit = closest_hit(tree.view(), view, {{0, 0, 0}, t_min, {0, 0, 1}});
-    ASSERT_TRUE(hit.has_value());
-    EXPECT_EQ(hit->triangle, 1u);
-    EXPECT_FLOAT_EQ(hit->t, 1.0e-27F);
+    const std::vector<Ray> ray = {{{0, 0, 0}, t_min, {0, 0, 1}}};
+    const Hit hit = tree.closest_hits(ray)[0];
+    ASSERT_TRUE(test::is_hit(hit));
+    EXPECT_EQ(hit.triangle, 1u);
+    EXPECT_FLOAT_EQ(hit.t, 1.0e-27F);
   }
 }
 
@@ -76,11 +76,11 @@ TEST(QueryFound, NeedleThatPointsAtTheOrigin) {
                                           {0x1.245d94p-108F, -0x1.bc8e4ep-13F, 0x1.13f2bp-6F},
                                           {-0x1.19374ap+9F, -0x1.b2ca38p+125F, -0x1.2446ecp-113F}};
   const TriangleView view{std::span<const glm::vec3>(corners)};
-  const Tree tree = build(view);
-  const Ray ray{{-0x1.ca6db8p+56F, -0x1.986e58p+124F, -0x1.713966p-83F},
+  const test::PlatformTree tree(view);
+  const std::vector<Ray> ray = {{{-0x1.ca6db8p+56F, -0x1.986e58p+124F, -0x1.713966p-83F},
                 0.0F,
-                {0x1.89bf2p+123F, -0x1.d4cddap+126F, 0x1.2e3d5ap+126F}};
-  EXPECT_FALSE(closest_hit(tree.view(), view, ray).has_value());
+                {0x1.89bf2p+123F, -0x1.d4cddap+126F, 0x1.2e3d5ap+126F}}};
+  EXPECT_FALSE(test::is_hit(tree.closest_hits(ray)[0]));
 }
 
 // An indexed mesh without faces is empty, however many vertices it has.
@@ -88,9 +88,10 @@ TEST(QueryFound, VerticesWithoutFaces) {
   for (const std::size_t count : {1u, 2u, 3u, 4u}) {
     const std::vector<glm::vec3> vertices(count);
     const TriangleView view{vertices, std::vector<glm::uvec3>{}};
-    const Tree tree = build(view);
-    EXPECT_TRUE(tree.view().empty());
-    EXPECT_FALSE(any_hit(tree.view(), view, {{0, 0, 0}, 0.0F, {0, 0, 1}}));
+    const test::PlatformTree tree(view);
+    EXPECT_TRUE(tree.host().view().empty());
+    const std::vector<Ray> ray = {{{0, 0, 0}, 0.0F, {0, 0, 1}}};
+    EXPECT_EQ(tree.any_hits(ray)[0], 0);
   }
 }
 
@@ -100,61 +101,15 @@ TEST(QueryFound, SoupWithMorePositionsThanIndicesCount) {
   view.positions = position;
   view.triangle_count = max_soup_count + 1;
   view.position_count = 3 * view.triangle_count;
-  try {
-    const Tree tree = build(view);
-    FAIL() << "accepted";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::too_many_triangles);
-    EXPECT_EQ(error.offender(), max_soup_count + 1);
-  }
-}
-
-// Single stages check the indices that they follow.
-TEST(StageFound, IndicesOutOfRangeAreErrors) {
-  const std::vector<Box> boxes(2);
-  const std::vector<std::uint64_t> codes(2);
-  std::vector<std::uint32_t> ids = {0, 7};
-  std::vector<stages::TrunkKey> keys(2);
-  std::vector<std::uint32_t> crowd(2);
-  const auto code_of = [](const auto& call) {
+  for (const test::WayToBuild& way : test::ways_to_build()) {
     try {
-      call();
+      const Tree tree = way.build(view, {});
+      ADD_FAILURE() << "accepted: " << way.name;
     } catch (const Error& error) {
-      return error.code();
+      EXPECT_EQ(error.code(), ErrorCode::too_many_triangles);
+      EXPECT_EQ(error.offender(), max_soup_count + 1);
     }
-    return ErrorCode::out_of_memory;  // none of these
-  };
-  EXPECT_EQ(code_of([&] {
-              (void)stages::recode_crowded({}, boxes, {}, codes, ids, 4, AxisOrder::by_extent, true,
-                                           keys, crowd, {});
-            }),
-            ErrorCode::invalid_view);
-
-  const std::vector<std::uint8_t> levels = {stages::first_fine_level};
-  std::vector<std::uint32_t> axes(1);
-  std::vector<float> planes(1);
-  crowd = {0, 3};
-  EXPECT_EQ(code_of([&] {
-              stages::split_planes({}, keys, levels, crowd, {}, std::vector<Lattice>(1), axes,
-                                   planes);
-            }),
-            ErrorCode::invalid_view);
-
-  const std::vector<std::uint32_t> first = {0, 1};
-  const std::vector<Link> children = {Link::leaf(0), Link::leaf(9)};
-  ids = {0, 1};
-  const stages::Skeleton skeleton{ids, first, levels, children, Link::node(0), axes, planes};
-  const std::vector<std::uint32_t> offsets = {0, 1, 2};
-  std::vector<Node> nodes(1);
-  EXPECT_EQ(code_of([&] {
-              stages::tight_boxes({}, boxes, skeleton, References::once, offsets, ids, nodes);
-            }),
-            ErrorCode::invalid_view);
-
-  Box infinite;
-  infinite.lo[0] = infinite.lo[1] = infinite.lo[2] = 0.0F;
-  infinite.hi[0] = infinite.hi[1] = infinite.hi[2] = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(code_of([&] { (void)stages::make_lattice(infinite, 32); }), ErrorCode::invalid_view);
+  }
 }
 
 }  // namespace

@@ -27,6 +27,7 @@
 #include "scene/load.hpp"
 #include "support/hits.hpp"
 #include "support/meshes.hpp"
+#include "support/platform_tree.hpp"
 #include "support/rays.hpp"
 #include "verify/band.hpp"
 #include "verify/check.hpp"
@@ -44,10 +45,10 @@ BuildOptions options_for(References references) {
   return options;
 }
 
-std::vector<Ray> rays_for(const test::NamedMesh& m, const Tree& tree, std::uint32_t count,
+std::vector<Ray> rays_for(const test::NamedMesh& m, const test::PlatformTree& tree, std::uint32_t count,
                           std::uint64_t seed) {
-  std::vector<Ray> rays = test::RayMaker(m.mesh, tree.view(), seed).all_kinds(count);
-  for (const std::vector<Ray>& more : {scene::random_rays(tree.view().bounds(), count / 4, seed),
+  std::vector<Ray> rays = test::RayMaker(m.mesh, tree.host().view(), seed).all_kinds(count);
+  for (const std::vector<Ray>& more : {scene::random_rays(tree.host().view().bounds(), count / 4, seed),
                                        scene::rays_at_features(m.mesh, count / 4, seed),
                                        scene::axis_rays(m.mesh, count / 4, seed)}) {
     rays.insert(rays.end(), more.begin(), more.end());
@@ -94,9 +95,9 @@ TEST_P(QueryOracle, NothingOutsideTheBand) {
     const verify::Oracle oracle(m.mesh.view());
     for (const References references : {References::once, References::all}) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", " + to_string(references));
-      const Tree tree = build(m.mesh.view(), options_for(references));
+      const test::PlatformTree tree(m.mesh.view(), options_for(references));
       const std::vector<Ray> rays = rays_for(m, tree, 600, seed);
-      const std::vector<Hit> hits = test::closest(tree.view(), m.mesh.view(), rays);
+      const std::vector<Hit> hits = tree.closest_hits(rays);
       const verify::Summary one = verify::check(oracle, m.mesh.view(), rays, hits, 2);
       total.add_counts(one);
       expect_none_outside_band(one, oracle, m, rays, hits);
@@ -220,9 +221,9 @@ Disagreements compare(const test::NamedMesh& m, const std::vector<Ray>& rays,
 
 TEST_P(QueryOracle, EmbreeRobustDisagreesOnlyWhereItIsWrongOrInTheBand) {
   const test::NamedMesh m = test::small_mesh(GetParam().number, 110);
-  const Tree tree = build(m.mesh.view(), options_for(References::once));
+  const test::PlatformTree tree(m.mesh.view(), options_for(References::once));
   const std::vector<Ray> rays = rays_for(m, tree, 1000, 110);
-  const Disagreements d = compare(m, rays, test::closest(tree.view(), m.mesh.view(), rays));
+  const Disagreements d = compare(m, rays, tree.closest_hits(rays));
   EXPECT_EQ(d.zkd_wrong, 0u);
 }
 
@@ -262,11 +263,11 @@ TEST(QueryOracleBunny, NothingOutsideTheBand) {
   const verify::Oracle oracle(m.mesh.view());
   verify::Summary total;
   for (const References references : {References::once, References::all}) {
-    const Tree tree = build(m.mesh.view(), options_for(references));
-    std::vector<Ray> rays = primary_rays(tree.view().bounds(), 128);
+    const test::PlatformTree tree(m.mesh.view(), options_for(references));
+    std::vector<Ray> rays = primary_rays(tree.host().view().bounds(), 128);
     const std::vector<Ray> hard = rays_for(m, tree, 4000, 120);
     rays.insert(rays.end(), hard.begin(), hard.end());
-    const std::vector<Hit> hits = test::closest(tree.view(), m.mesh.view(), rays);
+    const std::vector<Hit> hits = tree.closest_hits(rays);
     const verify::Summary one = verify::check(oracle, m.mesh.view(), rays, hits, 2);
     total.add_counts(one);
     expect_none_outside_band(one, oracle, m, rays, hits);

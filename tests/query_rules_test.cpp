@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The rules that zkd/query.hpp states: ends of the ray, ties, degenerate and coplanar rays, both
-// sides, lengths of directions, spans.
+// sides, lengths of directions.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "support/hits.hpp"
 #include "support/meshes.hpp"
+#include "support/platform_tree.hpp"
 #include "support/rays.hpp"
 
 namespace zkd {
@@ -28,18 +30,21 @@ constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 
 class QueryRules : public testing::TestWithParam<References> {
  protected:
-  [[nodiscard]] static Tree tree_of(const TriangleView& triangles) {
-    return build(
+  [[nodiscard]] static test::PlatformTree tree_of(const TriangleView& triangles) {
+    return test::PlatformTree(
         triangles,
         {.references = GetParam(), .leaf_size = 1, .invalid_triangles = InvalidTriangles::skip});
   }
 
-  static Hit shoot(const Tree& tree, const TriangleView& triangles, const Ray& ray) {
-    const Hit hit = or_miss(closest_hit(tree.view(), triangles, ray));
+  // Every query where the tree is, and those of zkd/query.hpp for a single ray.
+  static Hit shoot(const test::PlatformTree& tree, const TriangleView& triangles, const Ray& ray) {
+    const TreeView& on_host = tree.host().view();
+    const Hit hit = or_miss(closest_hit(on_host, triangles, ray));
     const std::vector<Ray> one = {ray};
-    EXPECT_TRUE(same_bits(test::closest(tree.view(), triangles, one)[0], hit)) << print(ray);
-    EXPECT_TRUE(same_bits(test::brute_force(tree.view(), triangles, one)[0], hit)) << print(ray);
-    EXPECT_EQ(any_hit(tree.view(), triangles, ray), test::is_hit(hit)) << print(ray);
+    EXPECT_TRUE(same_bits(tree.closest_hits(one)[0], hit)) << print(ray);
+    EXPECT_TRUE(same_bits(tree.brute_force_hits(one)[0], hit)) << print(ray);
+    EXPECT_EQ(tree.any_hits(one)[0], test::is_hit(hit) ? 1 : 0) << print(ray);
+    EXPECT_EQ(any_hit(on_host, triangles, ray), test::is_hit(hit)) << print(ray);
     return hit;
   }
 };
@@ -62,7 +67,7 @@ std::vector<glm::vec3> walls() {
 TEST_P(QueryRules, EndsAreIncluded) {
   const std::vector<glm::vec3> corners = walls();
   const TriangleView view{std::span(corners)};
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   const auto nearest = [&](float t_min, float t_max) {
     return shoot(tree, view, {{0.25F, 0.5F, 0}, t_min, {0, 0, 1}, t_max}).triangle;
   };
@@ -86,7 +91,7 @@ TEST_P(QueryRules, EndsAreIncluded) {
 TEST_P(QueryRules, NegativeTIsBehindTheOriginAndAllowed) {
   const std::vector<glm::vec3> corners = walls();
   const TriangleView view{std::span(corners)};
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   const Hit behind = shoot(tree, view, {{0.25F, 0.5F, 5}, -infinity, {0, 0, 1}, infinity});
   EXPECT_EQ(behind.triangle, 0u) << "the smallest t wins, whatever its sign";
   EXPECT_EQ(behind.t, -4.0F);
@@ -98,7 +103,7 @@ TEST_P(QueryRules, NegativeTIsBehindTheOriginAndAllowed) {
 TEST_P(QueryRules, OriginOnASurfaceHitsAtZero) {
   const std::vector<glm::vec3> corners = walls();
   const TriangleView view{std::span(corners)};
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   const Hit at = shoot(tree, view, {{0.25F, 0.5F, 2}, 0, {0, 0, 1}, infinity});
   EXPECT_EQ(at.triangle, 1u);
   EXPECT_EQ(at.t, 0.0F);
@@ -112,7 +117,7 @@ TEST_P(QueryRules, OriginOnASurfaceHitsAtZero) {
 TEST_P(QueryRules, BothSidesAndTheBoundaryAreHit) {
   const std::vector<glm::vec3> corners = {{0, 0, 1}, {4, 0, 1}, {0, 4, 1}};
   const TriangleView view{std::span(corners)};
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   const struct {
     float x, y, u, v;
     bool hit;
@@ -137,10 +142,13 @@ TEST_P(QueryRules, BothSidesAndTheBoundaryAreHit) {
 TEST_P(QueryRules, BarycentricsAndTNameTheSamePoint) {
   const scene::Mesh mesh = scene::soup(300, 70);
   const TriangleView view = mesh.view();
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   int hits = 0;
-  for (const Ray& ray : scene::rays_at_features(mesh, 2000, 70)) {
-    const Hit hit = or_miss(closest_hit(tree.view(), view, ray));
+  const std::vector<Ray> rays = scene::rays_at_features(mesh, 2000, 70);
+  const std::vector<Hit> all = tree.closest_hits(rays);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Ray& ray = rays[i];
+    const Hit& hit = all[i];
     if (!test::is_hit(hit)) continue;
     ++hits;
     EXPECT_GE(hit.u, 0.0F);
@@ -165,7 +173,7 @@ TEST_P(QueryRules, TheLowestIdWinsTies) {
     std::vector<std::uint32_t> permutation;
     const scene::Mesh shuffled = scene::shuffled(mesh, shuffle, &permutation);
     const TriangleView view = shuffled.view();
-    const Tree tree = tree_of(view);
+    const test::PlatformTree tree = tree_of(view);
     std::vector<std::uint32_t> lowest(60, no_triangle);
     for (std::uint32_t i = 0; i < permutation.size(); ++i) {
       lowest[permutation[i] % 60] = std::min(lowest[permutation[i] % 60], i);
@@ -184,7 +192,7 @@ TEST_P(QueryRules, TheLowestIdWinsTies) {
 TEST_P(QueryRules, SharedVertexBelongsToTheLowestId) {
   const scene::Mesh mesh = scene::fan(64);
   const TriangleView view = mesh.view();
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   for (const glm::vec3& vertex : mesh.positions) {
     for (int axis = 0; axis < 3; ++axis) {
       Ray ray;
@@ -200,7 +208,7 @@ TEST_P(QueryRules, SharedVertexBelongsToTheLowestId) {
         const std::vector<glm::vec3> alone = {mesh.positions[f.x], mesh.positions[f.y],
                                               mesh.positions[f.z]};
         const std::vector<Ray> rays = {ray};
-        const Hit other = test::brute_force(tree.view(), TriangleView{std::span(alone)}, rays)[0];
+        const Hit other = test::brute_force(tree.host().view(), TriangleView{std::span(alone)}, rays)[0];
         ASSERT_GT(other.t, hit.t) << "triangle " << id << " ties with " << hit.triangle;
       }
     }
@@ -212,7 +220,7 @@ TEST_P(QueryRules, SharedVertexBelongsToTheLowestId) {
 TEST_P(QueryRules, DegenerateRaysMiss) {
   const std::vector<glm::vec3> corners = walls();
   const TriangleView view{std::span(corners)};
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   const Ray good{{0.25F, 0.5F, 0}, 0, {0, 0, 1}, infinity};
   ASSERT_TRUE(test::is_hit(shoot(tree, view, good)));
   std::vector<Ray> bad;
@@ -233,9 +241,8 @@ TEST_P(QueryRules, DegenerateRaysMiss) {
   bad.push_back(good);
   bad.back().t_min = 5.0F;
   bad.back().t_max = 1.0F;
-  std::vector<TraversalCost> costs(bad.size());
-  std::vector<Hit> hits(bad.size(), Hit{1, 2, 3, 4});
-  closest_hit({}, tree.view(), view, bad, hits, costs);
+  std::vector<TraversalCost> costs;
+  const std::vector<Hit> hits = tree.closest_hits(bad, test::Walk::automatic, &costs);
   for (std::size_t i = 0; i < bad.size(); ++i) {
     EXPECT_TRUE(same_bits(hits[i], Hit{})) << print(bad[i]) << ": " << print(hits[i]);
     EXPECT_EQ(costs[i].node_visits, 0u) << "not at once: " << print(bad[i]);
@@ -256,7 +263,7 @@ TEST_P(QueryRules, CoplanarRaysMiss) {
       p = q;
     }
     const TriangleView view{std::span(std::as_const(corners))};
-    const Tree tree = tree_of(view);
+    const test::PlatformTree tree = tree_of(view);
     test::Random random(72);
     for (int i = 0; i < 500; ++i) {
       Ray ray;
@@ -279,7 +286,7 @@ TEST_P(QueryRules, LeftOutTrianglesAreNeverHit) {
       {-8, -8, 4},       {infinity, -8, 4}, {0, 8, 4},   // no end
       {-8, -8, 5},       {8, -8, 5},        {0, 8, 5}};  // a triangle
   const TriangleView view{std::span(corners)};
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   for (int i = 0; i <= 16; ++i) {
     const Ray ray{{static_cast<float>(i) / 4, 0, 0}, 0, {0, 0, 1}, infinity};
     EXPECT_EQ(shoot(tree, view, ray).triangle, 4u) << print(ray);
@@ -291,28 +298,28 @@ TEST_P(QueryRules, LeftOutTrianglesAreNeverHit) {
 TEST_P(QueryRules, TScalesExactlyWithPowersOfTwoOfTheDirection) {
   const scene::Mesh mesh = scene::soup(300, 73);
   const TriangleView view = mesh.view();
-  const Tree tree = tree_of(view);
-  int hits = 0;
-  for (Ray ray : scene::rays_at_features(mesh, 500, 73)) {
-    const Hit one = or_miss(closest_hit(tree.view(), view, ray));
-    hits += test::is_hit(one) ? 1 : 0;
-    const glm::vec3 direction = ray.direction;
-    for (const int e : {-66, -20, -1, 1, 10, 60}) {
-      ray.direction = direction * std::ldexp(1.0F, e);
-      Hit want = one;
-      want.t = std::ldexp(one.t, -e);
-      const Hit scaled = or_miss(closest_hit(tree.view(), view, ray));
-      ASSERT_TRUE(same_bits(scaled, want)) << "2^" << e << ": " << print(scaled) << " instead of "
-                                           << print(want) << ", " << print(ray);
+  const test::PlatformTree tree = tree_of(view);
+  const std::vector<Ray> rays = scene::rays_at_features(mesh, 500, 73);
+  const std::vector<Hit> at_one = tree.closest_hits(rays);
+  EXPECT_GT(std::count_if(at_one.begin(), at_one.end(), test::is_hit), 250);
+  for (const int e : {-66, -20, -1, 1, 10, 60}) {
+    std::vector<Ray> scaled = rays;
+    for (Ray& ray : scaled) ray.direction *= std::ldexp(1.0F, e);
+    const std::vector<Hit> hits = tree.closest_hits(scaled);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      Hit want = at_one[i];
+      want.t = std::ldexp(want.t, -e);
+      ASSERT_TRUE(same_bits(hits[i], want)) << "2^" << e << ": " << print(hits[i])
+                                            << " instead of " << print(want) << ", "
+                                            << print(rays[i]);
     }
   }
-  EXPECT_GT(hits, 250);
 }
 
 TEST_P(QueryRules, DirectionsOfAnyLengthHit) {
   const std::vector<glm::vec3> corners = walls();
   const TriangleView view{std::span(corners)};
-  const Tree tree = tree_of(view);
+  const test::PlatformTree tree = tree_of(view);
   for (const float length : {1e-30F, 1e-20F, 1e-10F, 3.0F, 1e10F, 1e18F, 1e30F, 1e38F}) {
     const Hit hit = shoot(tree, view, {{0.25F, 0.5F, 0}, 0, {0, 0, length}, infinity});
     EXPECT_EQ(hit.triangle, 0u) << length;
@@ -320,54 +327,24 @@ TEST_P(QueryRules, DirectionsOfAnyLengthHit) {
   }
 }
 
-// ---- Spans --------------------------------------------------------------------------------------
-
-TEST_P(QueryRules, ShorterSpansEndTheWork) {
-  const scene::Mesh mesh = scene::sphere(2);
-  const Tree tree = tree_of(mesh.view());
-  const std::vector<Ray> rays = scene::rays_at_features(mesh, 100, 74);
-  const std::vector<Hit> want = test::closest(tree.view(), mesh.view(), rays);
-  const Hit untouched{-1, -2, -3, 12345};
-  for (const std::size_t length : {0u, 1u, 37u, 100u}) {
-    std::vector<Hit> hits(100, untouched);
-    closest_hit({}, tree.view(), mesh.view(), rays, std::span(hits).first(length));
-    std::vector<Hit> loop(100, untouched);
-    closest_hit_brute_force({}, tree.view(), mesh.view(), rays, std::span(loop).first(length));
-    std::vector<std::uint8_t> occluded(100, 9);
-    any_hit({}, tree.view(), mesh.view(), rays, std::span(occluded).first(length));
-    for (std::size_t i = 0; i < 100; ++i) {
-      EXPECT_TRUE(same_bits(hits[i], i < length ? want[i] : untouched));
-      EXPECT_TRUE(same_bits(loop[i], i < length ? want[i] : untouched));
-      EXPECT_EQ(occluded[i], i < length ? (test::is_hit(want[i]) ? 1 : 0) : 9);
-    }
-    std::vector<TraversalCost> costs(std::max<std::size_t>(length, 1));
-    std::fill(hits.begin(), hits.end(), untouched);
-    closest_hit({}, tree.view(), mesh.view(), rays, hits, costs);
-    for (std::size_t i = 0; i < 100; ++i) {
-      EXPECT_TRUE(same_bits(hits[i], i < costs.size() ? want[i] : untouched)) << i;
-    }
-  }
-}
+// ---- Trees and triangles -------------------------------------------------------------------------
 
 TEST_P(QueryRules, EmptyTreeMissesEverything) {
-  const Tree tree = tree_of(TriangleView{});
-  const Tree nothing;
+  const test::PlatformTree built = tree_of(TriangleView{});
+  const test::PlatformTree brought(Tree(), TriangleView{});
   const std::vector<Ray> rays = scene::random_rays(Box{}, 100, 75);
-  for (const Tree* empty : {&tree, &nothing}) {
-    for (const Hit& hit : test::closest(empty->view(), TriangleView{}, rays)) {
-      EXPECT_TRUE(same_bits(hit, Hit{}));
-    }
-    for (const Hit& hit : test::brute_force(empty->view(), TriangleView{}, rays)) {
-      EXPECT_TRUE(same_bits(hit, Hit{}));
-    }
+  for (const test::PlatformTree* empty : {&built, &brought}) {
+    for (const Hit& hit : empty->closest_hits(rays)) EXPECT_TRUE(same_bits(hit, Hit{}));
+    for (const Hit& hit : empty->brute_force_hits(rays)) EXPECT_TRUE(same_bits(hit, Hit{}));
+    for (const std::uint8_t occluded : empty->any_hits(rays)) EXPECT_EQ(occluded, 0);
   }
 }
 
 TEST_P(QueryRules, TrianglesAtOtherAddressesGiveTheSameAnswers) {
   const scene::Mesh mesh = scene::soup(300, 76);
-  const Tree tree = tree_of(mesh.view());
+  const test::PlatformTree tree = tree_of(mesh.view());
   const std::vector<Ray> rays = scene::rays_at_features(mesh, 500, 76);
-  const std::vector<Hit> want = test::closest(tree.view(), mesh.view(), rays);
+  const std::vector<Hit> want = tree.closest_hits(rays);
   const scene::Mesh copy = mesh;
   std::vector<float> wide(mesh.positions.size() * 5);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
@@ -376,7 +353,7 @@ TEST_P(QueryRules, TrianglesAtOtherAddressesGiveTheSameAnswers) {
   const TriangleView strided =
       TriangleView::strided(wide.data(), mesh.positions.size(), 20, mesh.faces);
   for (const TriangleView& view : {copy.view(), strided}) {
-    const std::vector<Hit> got = test::closest(tree.view(), view, rays);
+    const std::vector<Hit> got = test::PlatformTree(tree.host(), view).closest_hits(rays);
     for (std::size_t i = 0; i < rays.size(); ++i) ASSERT_TRUE(same_bits(got[i], want[i]));
   }
 }

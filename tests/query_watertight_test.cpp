@@ -13,6 +13,7 @@
 #include "scene/generate.hpp"
 #include "support/hits.hpp"
 #include "support/meshes.hpp"
+#include "support/platform_tree.hpp"
 #include "support/random.hpp"
 
 namespace zkd {
@@ -48,18 +49,17 @@ std::vector<Ray> rays_from_inside(const scene::Mesh& mesh, const glm::vec3& cent
 void expect_no_leak(const scene::Mesh& mesh, const std::vector<Ray>& rays,
                     const std::string& name) {
   for (const References references : {References::once, References::all}) {
-    const Tree tree = build(mesh.view(), {.references = references});
-    for (const auto set : {cpu::InstructionSet::portable, cpu::InstructionSet::avx2}) {
-      const cpu::Executor executor{.threads = 2, .instructions = set};
-      const std::vector<Hit> hits = test::closest(tree.view(), mesh.view(), rays, executor);
+    const test::PlatformTree tree(mesh.view(), {.references = references});
+    for (const test::Walk walk : test::walks()) {
+      const std::vector<Hit> hits = tree.closest_hits(rays, walk);
       std::size_t leaks = 0;
       std::string first;
       for (std::size_t i = 0; i < rays.size(); ++i) {
         if (test::is_hit(hits[i])) continue;
         if (leaks++ == 0) first = print(rays[i]);
       }
-      EXPECT_EQ(leaks, 0u) << name << ", " << to_string(references) << ": of " << rays.size()
-                           << ", the first " << first;
+      EXPECT_EQ(leaks, 0u) << name << ", " << to_string(references) << ", " << test::name(walk)
+                           << ": of " << rays.size() << ", the first " << first;
     }
   }
 }
@@ -82,9 +82,9 @@ TEST(QueryWatertight, ClosedConeFromInside) {
     glm::vec3 centre;
     for (int a = 0; a < 3; ++a) centre[a] = 0.5F * box.lo[a] + 0.5F * box.hi[a];
     const std::vector<Ray> rays = rays_from_inside(mesh, centre, 0.01F, 4000, 92);
-    const Tree tree = build(mesh.view());
-    const std::vector<Hit> loop = test::brute_force(tree.view(), mesh.view(), rays);
-    const std::vector<Hit> hits = test::closest(tree.view(), mesh.view(), rays);
+    const test::PlatformTree tree(mesh.view());
+    const std::vector<Hit> loop = tree.brute_force_hits(rays);
+    const std::vector<Hit> hits = tree.closest_hits(rays);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       ASSERT_TRUE(test::same_bits(hits[i], loop[i])) << print(rays[i]);
     }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// Putting together what is said and owned once a tree is finished.
 #include "core/outcome.hpp"
 
 namespace zkd {
 
 Tree TreeAssembler::assemble(const TreeView& view, const core::BuildState& state,
                              const BuildOptions& options, const Statistics& statistics,
-                             cpu::Block& tree_block, cpu::Block& reference_block) {
+                             core::HostBlock& tree_block, core::HostBlock& reference_block) {
   Tree tree;
   tree.view_ = view;
   tree.lattice_ = state.lattice;

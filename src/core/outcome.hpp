@@ -9,8 +9,8 @@
 #include <zkd/statistics.hpp>
 #include <zkd/tree.hpp>
 
+#include "core/host_block.hpp"
 #include "core/pipeline.hpp"
-#include "cpu/memory.hpp"
 
 namespace zkd {
 
@@ -20,7 +20,7 @@ struct TreeAssembler {
   /// `reference_block`. The tree owns both from now on.
   ZKD_API static Tree assemble(const TreeView& view, const core::BuildState& state,
                                const BuildOptions& options, const Statistics& statistics,
-                               cpu::Block& tree_block, cpu::Block& reference_block);
+                               core::HostBlock& tree_block, core::HostBlock& reference_block);
 
   static Statistics& statistics(Tree& tree) { return tree.statistics_; }
 };

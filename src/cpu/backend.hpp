@@ -22,9 +22,9 @@
 #include <zkd/tree.hpp>
 
 #include "core/check_input.hpp"
+#include "core/host_block.hpp"
 #include "core/pipeline.hpp"
 #include "cpu/float_environment.hpp"
-#include "cpu/memory.hpp"
 #include "cpu/radix_sort.hpp"
 #include "cpu/threads.hpp"
 
@@ -168,7 +168,7 @@ class Backend {
     const std::uint32_t n = size(count);
     SortScratch scratch{};
     const int team = threads_.team(n);
-    const Block block = lay_out(scratch, team, digits_of(bits));
+    const core::HostBlock block = lay_out(scratch, team, digits_of(bits));
     return RadixSort<Key>(threads_, scratch, buffers, n, bits).run(passes_left_out_);
   }
 
@@ -259,13 +259,14 @@ class Backend {
 
   void allocate_tree(core::Count trunks) {
     core::TreeArrays arrays{};
-    tree_block_ = Block(memory_, core::bytes_of(arrays, size(trunks)));
+    tree_block_ = core::HostBlock(memory_, core::bytes_of(arrays, size(trunks)));
     core::Arena arena(tree_block_.data());
     arrays.lay_out(arena, size(trunks));
     arrays_ = arrays;
   }
   void allocate_references(core::Count references) {
-    reference_block_ = Block(memory_, std::size_t{size(references)} * sizeof(std::uint32_t));
+    reference_block_ =
+        core::HostBlock(memory_, std::size_t{size(references)} * sizeof(std::uint32_t));
     references_ = static_cast<std::uint32_t*>(reference_block_.data());
   }
 
@@ -291,15 +292,15 @@ class Backend {
   [[nodiscard]] std::uint32_t passes_left_out() const { return passes_left_out_; }
   [[nodiscard]] std::size_t workspace_bytes() const { return most_held_; }
   [[nodiscard]] std::pmr::memory_resource* memory() const { return memory_; }
-  Block& tree_block() { return tree_block_; }
-  Block& reference_block() { return reference_block_; }
+  core::HostBlock& tree_block() { return tree_block_; }
+  core::HostBlock& reference_block() { return reference_block_; }
 
  private:
   /// Working memory of the backend itself, for the time of one verb.
   template <class T>
   struct Scratch {
     T* data;
-    Block block;
+    core::HostBlock block;
 
     struct Layout {
       T* array;
@@ -313,8 +314,8 @@ class Backend {
   };
 
   template <class Layout, class... Counts>
-  Block lay_out(Layout& layout, Counts... counts) {
-    Block block(memory_, core::bytes_of(layout, counts...));
+  core::HostBlock lay_out(Layout& layout, Counts... counts) {
+    core::HostBlock block(memory_, core::bytes_of(layout, counts...));
     core::Arena arena(block.data());
     layout.lay_out(arena, counts...);
     std::size_t held = block.bytes();
@@ -339,11 +340,11 @@ class Backend {
   FloatEnvironment environment_;  // for the serial steps between passes
   Threads threads_;
   std::pmr::memory_resource* memory_;
-  Block blocks_[max_blocks];
+  core::HostBlock blocks_[max_blocks];
   int blocks_used_ = 0;
   std::size_t most_held_ = 0;
-  Block tree_block_;
-  Block reference_block_;
+  core::HostBlock tree_block_;
+  core::HostBlock reference_block_;
   core::TreeArrays arrays_{};
   std::uint32_t* references_ = nullptr;
 

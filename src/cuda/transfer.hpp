@@ -10,10 +10,10 @@
 #include <zkd/cuda/tree.hpp>
 #include <zkd/tree.hpp>
 
+#include "core/host_block.hpp"
 #include "core/outcome.hpp"
 #include "core/quality.hpp"
 #include "core/status.hpp"
-#include "cpu/memory.hpp"
 #include "cuda/build_steps.hpp"
 
 namespace zkd::cuda {
@@ -47,8 +47,8 @@ zkd::Tree copy_to_host(Device& device, const Tree& tree, const core::BuildState*
   const std::size_t reference_bytes = std::size_t{state.counts.references} * sizeof(std::uint32_t);
 
   core::TreeArrays arrays{};
-  cpu::Block tree_block(memory, core::bytes_of(arrays, leaves));
-  cpu::Block reference_block(memory, reference_bytes);
+  core::HostBlock tree_block(memory, core::bytes_of(arrays, leaves));
+  core::HostBlock reference_block(memory, reference_bytes);
   core::Arena arena(tree_block.data());
   arrays.lay_out(arena, leaves);
   const TreeView& from = tree.view();

@@ -12,11 +12,11 @@
 //   Array<T>                  values where the platform's stages find them: made of a length or of
 //                             host values, passed as a span, brought back by download()
 //   upload(...)               an Array of these values; a TriangleView that may be passed to stages
-//   build(triangles, options)            a tree in host memory
-//   closest_hits(tree, triangles, rays)  traced on the platform; all in host memory
 //   thinning                  where a call costs launches and waits, tests with thousands of tiny
 //                             calls make one in so many
 //   sort_leaves_passes_out    whether stages::radix_sort looks for passes that are not needed
+//
+// Tests of whole trees need none of it: see support/platform_tree.hpp.
 #pragma once
 
 #if defined(ZKD_TEST_CUDA)

@@ -4,13 +4,10 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
-#include <zkd/build.hpp>
 #include <zkd/cpu/executor.hpp>
-#include <zkd/query.hpp>
 
 #include "support/host_array.hpp"
 
@@ -45,17 +42,6 @@ inline std::string name(const Executor& executor) {
   if (executor.instructions == cpu::InstructionSet::portable) text += ", portable";
   if (executor.instructions == cpu::InstructionSet::avx2) text += ", AVX2";
   return text;
-}
-
-inline Tree build(const TriangleView& triangles, const BuildOptions& options = {}) {
-  return zkd::build(executor(), triangles, options);
-}
-
-inline std::vector<Hit> closest_hits(const Tree& tree, const TriangleView& triangles,
-                                     std::span<const Ray> rays) {
-  std::vector<Hit> hits(rays.size());
-  closest_hit(executor(), tree.view(), triangles, rays, hits);
-  return hits;
 }
 
 }  // namespace zkd::test

@@ -6,6 +6,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <new>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -16,8 +18,9 @@
 #include <cuda_runtime_api.h>
 
 #include <zkd/cuda/build.hpp>
-#include <zkd/cuda/query.hpp>
+#include <zkd/cuda/executor.hpp>
 #include <zkd/geometry.hpp>
+#include <zkd/options.hpp>
 
 #include "support/uploaded_triangles.hpp"
 
@@ -58,6 +61,13 @@ class Array {
   operator std::span<T>() { return {data_, count_}; }
   operator std::span<const T>() const { return {data_, count_}; }
 
+  /// As many values as before.
+  void assign(std::span<const T> values) {
+    if (values.size() != count_) throw std::logic_error("an array does not change its length");
+    if (count_ != 0)
+      require(cudaMemcpy(data_, values.data(), values.size_bytes(), cudaMemcpyHostToDevice));
+  }
+
   [[nodiscard]] const T* data() const { return data_; }
 
   [[nodiscard]] std::vector<T> download() const {
@@ -81,22 +91,50 @@ inline UploadedTriangles<Array> upload(const TriangleView& triangles) {
   return UploadedTriangles<Array>(triangles);
 }
 
-/// Makes the room that `all` needs.
-inline Tree build(const TriangleView& triangles, const BuildOptions& options = {}) {
-  const UploadedTriangles<Array> on_device(triangles);
+/// `all` with the room that it needs.
+inline BuildOptions with_room(const TriangleView& triangles, const BuildOptions& options) {
+  if (options.references != References::all || options.reference_capacity != 0) return options;
   BuildOptions enough = options;
-  if (options.references == References::all && options.reference_capacity == 0)
-    enough.reference_capacity = analyse(executor(), on_device, options).reference_capacity;
-  return zkd::build(executor(), on_device, enough).to_host();
+  enough.reference_capacity = analyse(executor(), triangles, options).reference_capacity;
+  return enough;
 }
 
-inline std::vector<Hit> closest_hits(const Tree& tree, const TriangleView& triangles,
-                                     std::span<const Ray> rays) {
-  const cuda::Tree on_device = cuda::to_device(executor(), tree, triangles);
-  const Array<Ray> uploaded(rays);
-  Array<Hit> hits(rays.size());
-  closest_hit(executor(), on_device.view(), on_device.triangles(), uploaded, hits);
-  return hits.download();
-}
+/// A program's own device memory, in the order of a stream: counts, and refuses.
+class CountingMemory final : public cuda::MemoryResource {
+ public:
+  /// The allocation (from 1) that is refused; 0: none.
+  std::size_t refuse_at = 0;
+
+  void* allocate(std::size_t bytes, cuda::Stream stream) override {
+    asked_.push_back(bytes);
+    if (asked_.size() == refuse_at) throw std::bad_alloc();
+    void* data = nullptr;
+    require(cudaMallocAsync(&data, bytes, stream));
+    live_[data] = bytes;
+    return data;
+  }
+
+  void deallocate(void* data, std::size_t bytes, cuda::Stream stream) noexcept override {
+    const auto block = live_.find(data);
+    if (block == live_.end() || block->second != bytes) {
+      misused_ = true;
+      return;
+    }
+    live_.erase(block);
+    misused_ |= cudaFreeAsync(data, stream) != cudaSuccess;
+  }
+
+  /// Bytes of each allocation since the last forget(), refused ones too.
+  [[nodiscard]] const std::vector<std::size_t>& asked() const { return asked_; }
+  [[nodiscard]] std::size_t live_blocks() const { return live_.size(); }
+  /// A block came back that was not given out, of another size, or on a stream that refused it.
+  [[nodiscard]] bool misused() const { return misused_; }
+  void forget() { asked_.clear(); }
+
+ private:
+  std::vector<std::size_t> asked_;
+  std::map<void*, std::size_t> live_;
+  bool misused_ = false;
+};
 
 }  // namespace zkd::test

@@ -10,8 +10,6 @@
 #include <vector>
 
 #include <zkd/geometry.hpp>
-#include <zkd/options.hpp>
-#include <zkd/tree.hpp>
 
 #include "support/simulated_device.hpp"
 #include "support/uploaded_triangles.hpp"
@@ -42,15 +40,6 @@ Array<T> upload(const std::vector<T>& values) {
 
 inline UploadedTriangles<simulated::Array> upload(const TriangleView& triangles) {
   return UploadedTriangles<simulated::Array>(triangles);
-}
-
-inline Tree build(const TriangleView& triangles, const BuildOptions& options = {}) {
-  return simulated::build(executor(), triangles, options);
-}
-
-inline std::vector<Hit> closest_hits(const Tree& tree, const TriangleView& triangles,
-                                     std::span<const Ray> rays) {
-  return simulated::closest_hits(executor(), tree, triangles, rays);
 }
 
 }  // namespace zkd::test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Blocks from the caller's memory resource.
+// Blocks of host memory from the caller's resource.
 #pragma once
 
 #if defined(__linux__)
@@ -18,7 +18,7 @@
 
 #include "core/arena.hpp"
 
-namespace zkd::cpu {
+namespace zkd::core {
 
 /// Large blocks fresh from the system cost a page fault for every 4 KB, a quarter of a build. With
 /// huge pages it is one for every 2 MB. Only a hint, and only on memory that is not the caller's.
@@ -32,29 +32,29 @@ inline void ask_for_huge_pages([[maybe_unused]] void* data, [[maybe_unused]] std
 }
 
 /// One block, given back at the end of its life. Every failure to get one is an Error.
-class Block {
+class HostBlock {
  public:
-  Block() = default;
-  Block(std::pmr::memory_resource* memory, std::size_t bytes) : memory_(memory), bytes_(bytes) {
+  HostBlock() = default;
+  HostBlock(std::pmr::memory_resource* memory, std::size_t bytes) : memory_(memory), bytes_(bytes) {
     if (bytes == 0) return;
     try {
-      data_ = memory->allocate(bytes, core::Arena::alignment);
+      data_ = memory->allocate(bytes, Arena::alignment);
     } catch (const std::bad_alloc&) {
       throw Error(ErrorCode::out_of_memory, bytes,
                   "the memory resource refused " + std::to_string(bytes) + " bytes");
     }
     if (memory == std::pmr::new_delete_resource()) ask_for_huge_pages(data_, bytes);
   }
-  Block(Block&& other) noexcept
+  HostBlock(HostBlock&& other) noexcept
       : memory_(other.memory_), data_(std::exchange(other.data_, nullptr)), bytes_(other.bytes_) {}
-  Block& operator=(Block&& other) noexcept {
+  HostBlock& operator=(HostBlock&& other) noexcept {
     std::swap(memory_, other.memory_);
     std::swap(data_, other.data_);
     std::swap(bytes_, other.bytes_);
     return *this;
   }
-  ~Block() {
-    if (data_ != nullptr) memory_->deallocate(data_, bytes_, core::Arena::alignment);
+  ~HostBlock() {
+    if (data_ != nullptr) memory_->deallocate(data_, bytes_, Arena::alignment);
   }
 
   [[nodiscard]] void* data() const noexcept { return data_; }
@@ -69,4 +69,4 @@ class Block {
   std::size_t bytes_ = 0;
 };
 
-}  // namespace zkd::cpu
+}  // namespace zkd::core

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include "cpu/memory.hpp"
+#include "core/host_block.hpp"
 
 namespace zkd {
 
@@ -34,8 +34,8 @@ Tree::~Tree() {
 
 Tree Tree::clone(std::pmr::memory_resource* memory) const {
   if (memory == nullptr) memory = std::pmr::get_default_resource();
-  cpu::Block nodes(memory, node_block_.bytes);
-  cpu::Block references(memory, reference_block_.bytes);
+  core::HostBlock nodes(memory, node_block_.bytes);
+  core::HostBlock references(memory, reference_block_.bytes);
   Tree copy;
   copy.view_ = view_;
   copy.lattice_ = lattice_;
