@@ -5,9 +5,12 @@
 // zkd::cuda.
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <vector>
 
 #include <cuda_runtime.h>
+#include <thrust/device_vector.h>
+#include <thrust/host_vector.h>
 
 #include <zkd/cuda/build.hpp>
 #include <zkd/cuda/device.hpp>
@@ -40,18 +43,17 @@ int main() try {
   const zkd::cuda::Executor gpu;  // the default stream
   const zkd::cuda::Tree tree = zkd::build(gpu, zkd::TriangleView{vertices, faces});
 
-  float* heights = nullptr;
-  cudaMallocManaged(&heights, side * side * sizeof(float));
-  look_down<<<side * side / 128, 128, 0, gpu.stream>>>(tree.view(), tree.triangles(), heights);
+  thrust::device_vector<float> on_device(side * side);
+  look_down<<<side * side / 128, 128, 0, gpu.stream>>>(tree.view(), tree.triangles(),
+                                                       on_device.data().get());
   tree.check();  // waits, and throws what went wrong in the build
-  if (const cudaError_t status = cudaDeviceSynchronize(); status != cudaSuccess) {
-    std::fprintf(stderr, "%s\n", cudaGetErrorString(status));
-    return 1;
-  }
+  const thrust::host_vector<float> heights = on_device;  // waits, and throws what went wrong here
   for (std::uint32_t i = 0; i < side * side; ++i)
     std::printf("%1.0f%s", heights[i], (i + 1) % side == 0 ? "\n" : " ");
-  cudaFree(heights);
 } catch (const zkd::Error& error) {
   std::fprintf(stderr, "%s: %s\n", zkd::to_string(error.code()), error.what());
+  return 1;
+} catch (const std::exception& error) {  // thrust's
+  std::fprintf(stderr, "%s\n", error.what());
   return 1;
 }

@@ -1,89 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every ErrorCode: reached by the input that it names, with the first offender, and nothing leaked.
+// Errors of builds: reached by the input that they name, with the first offender, in every way to
+// build, and nothing leaked.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include <zkd/stages.hpp>
 #include <zkd/zkd.hpp>
 
-#include "core/status.hpp"
-#include "support/memory.hpp"
+#include "support/caught.hpp"
+#include "support/platform_tree.hpp"
+#include "support/strip.hpp"
 
 namespace zkd {
 namespace {
 
-using test::CountingResource;
+using test::Caught;
+using test::caught;
+using test::names;
+using test::Strip;
 
 constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// A strip of `count` triangles.
-struct Strip {
-  std::vector<glm::vec3> vertices;
-  std::vector<glm::uvec3> faces;
-
-  explicit Strip(std::uint32_t count) {
-    for (std::uint32_t i = 0; i < count + 2; ++i) {
-      vertices.emplace_back(static_cast<float>(i / 2), static_cast<float>(i % 2), 0.0F);
-    }
-    for (std::uint32_t i = 0; i < count; ++i) faces.emplace_back(i, i + 1, i + 2);
-  }
-  [[nodiscard]] TriangleView view() const { return {vertices, faces}; }
-};
-
-struct Caught {
-  bool thrown = false;
-  ErrorCode code{};
-  std::uint64_t offender = 0;
-  std::string message;
-};
-
-Caught caught(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    EXPECT_STRNE(error.what(), "");
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << "one line";
-    return {true, error.code(), error.offender(), error.what()};
-  }
-  return {};
-}
-
-bool names(const Caught& error, const std::string& what) {
-  return error.message.find(what) != std::string::npos;
-}
-
-// Builds with and without an executor; both must throw the same and leak nothing.
+// The CPU's, which every way to build must give.
 Caught build_error(const TriangleView& triangles, const BuildOptions& options = {}) {
-  const Caught plain = caught([&] { (void)build(triangles, options); });
-  for (int threads = 1; threads <= 3; ++threads) {
-    CountingResource memory;
-    const Caught with_executor =
-        caught([&] { (void)build({.threads = threads, .memory = &memory}, triangles, options); });
-    EXPECT_EQ(with_executor.thrown, plain.thrown);
-    EXPECT_EQ(with_executor.code, plain.code);
-    EXPECT_EQ(with_executor.offender, plain.offender);
-    EXPECT_EQ(with_executor.message, plain.message);
-    EXPECT_EQ(memory.live_bytes(), 0u);
+  const Caught want = caught([&] { (void)build(cpu::Executor{.threads = 2}, triangles, options); });
+  for (const test::WayToBuild& way : test::ways_to_build()) {
+    const Caught got = caught([&] { (void)way.build(triangles, options); });
+    EXPECT_EQ(got.thrown, want.thrown) << way.name;
+    EXPECT_EQ(got.code, want.code) << way.name;
+    EXPECT_EQ(got.offender, want.offender) << way.name;
+    EXPECT_EQ(got.message, want.message) << way.name;
   }
-  return plain;
+  return want;
 }
-
-#define EXPECT_ERROR(error, expected, first_offender)                               \
-  do {                                                                              \
-    const Caught& e = (error);                                                      \
-    ASSERT_TRUE(e.thrown) << "nothing was thrown";                                  \
-    EXPECT_EQ(e.code, expected) << e.message;                                       \
-    EXPECT_EQ(e.offender, static_cast<std::uint64_t>(first_offender)) << e.message; \
-    EXPECT_TRUE(names(e, std::to_string(first_offender))) << e.message;             \
-  } while (false)
 
 // ---- Triangles ----------------------------------------------------------------------------------
 
@@ -106,7 +60,7 @@ TEST(ApiError, NonFiniteVertex) {
     strip.vertices[4000].x = nan_value;
     EXPECT_ERROR(build_error(strip.view()), ErrorCode::non_finite_vertex, 1232);
     EXPECT_FALSE(build_error(strip.view(), {.invalid_triangles = InvalidTriangles::skip}).thrown);
-    const Tree tree = build(strip.view(), {.invalid_triangles = InvalidTriangles::skip});
+    const Tree tree = test::build(strip.view(), {.invalid_triangles = InvalidTriangles::skip});
     EXPECT_EQ(tree.statistics().skipped_non_finite, 6u);
   }
 }
@@ -118,7 +72,7 @@ TEST(ApiError, TooManyTriangles) {
     TriangleView view = strip.view();
     view.triangle_count = count;  // counted before anything is read
     EXPECT_ERROR(build_error(view), ErrorCode::too_many_triangles, count);
-    EXPECT_ERROR(caught([&] { (void)memory_requirement({}, count); }),
+    EXPECT_ERROR(caught([&] { (void)memory_requirement(cpu::Executor{}, count); }),
                  ErrorCode::too_many_triangles, count);
   }
 }
@@ -227,7 +181,7 @@ TEST(ApiError, EnumeratorsThatDoNotExist) {
   EXPECT_ERROR(build_error(strip.view(), options), ErrorCode::invalid_option, 99);
   options = {};
   options.backend = static_cast<Backend>(99);
-  EXPECT_ERROR(caught([&] { (void)build(strip.view(), options); }), ErrorCode::invalid_option, 99);
+  EXPECT_ERROR(build_error(strip.view(), options), ErrorCode::invalid_option, 99);
 }
 
 TEST(ApiError, OptionsOfLaterVersions) {
@@ -245,128 +199,15 @@ TEST(ApiError, OptionsOfLaterVersions) {
     ASSERT_TRUE(error.thrown) << words[i];
     EXPECT_EQ(error.code, ErrorCode::unsupported_option) << error.message;
     EXPECT_TRUE(names(error, words[i])) << error.message;
-    EXPECT_EQ(caught([&] { (void)memory_requirement({}, 10, later[i]); }).code,
+    EXPECT_EQ(caught([&] { (void)memory_requirement(cpu::Executor{}, 10, later[i]); }).code,
               ErrorCode::unsupported_option);
   }
 }
 
 TEST(ApiError, OptionsAreCheckedForEmptyInputToo) {
   EXPECT_ERROR(build_error(TriangleView{}, {.leaf_size = 0}), ErrorCode::invalid_option, 0);
-  EXPECT_ERROR(caught([] { (void)memory_requirement({}, 10, {.leaf_size = 0}); }),
+  EXPECT_ERROR(caught([] { (void)memory_requirement(cpu::Executor{}, 10, {.leaf_size = 0}); }),
                ErrorCode::invalid_option, 0);
-}
-
-TEST(ApiError, BackendThatIsNotThere) {
-  const Strip strip(10);
-  const Caught error = caught([&] { (void)build(strip.view(), {.backend = Backend::cuda}); });
-  ASSERT_TRUE(error.thrown);
-  EXPECT_EQ(error.code, ErrorCode::backend_unavailable) << error.message;
-  EXPECT_TRUE(names(error, "cuda") || names(error, "CUDA")) << error.message;
-  EXPECT_NO_THROW((void)build(strip.view(), {.backend = Backend::cpu}));
-  EXPECT_NO_THROW((void)build(strip.view(), {.backend = Backend::automatic}));
-  EXPECT_NO_THROW((void)build(cpu::Executor{}, strip.view(), {.backend = Backend::cuda}))
-      << "with an executor the backend is not looked at";
-}
-
-TEST(ApiError, OutOfMemory) {
-  const Strip strip(100);
-  const Caught error =
-      caught([&] { (void)build({.memory = std::pmr::null_memory_resource()}, strip.view()); });
-  ASSERT_TRUE(error.thrown);
-  EXPECT_EQ(error.code, ErrorCode::out_of_memory) << error.message;
-  EXPECT_GT(error.offender, 0u);
-  EXPECT_TRUE(names(error, std::to_string(error.offender))) << error.message;
-}
-
-// An absurd number of threads is refused or made sensible; it never crashes or changes the tree.
-TEST(ApiError, AbsurdThreadCounts) {
-  const Strip strip(100);
-  for (const int threads : {-1, std::numeric_limits<int>::min(), 1000}) {
-    const Caught error = caught([&] { (void)build({.threads = threads}, strip.view()); });
-    if (threads > 0) {
-      EXPECT_FALSE(error.thrown) << error.message;
-    } else if (error.thrown) {
-      EXPECT_EQ(error.code, ErrorCode::invalid_option) << error.message;
-    }
-  }
-}
-
-// ---- Names and stages ---------------------------------------------------------------------------
-
-TEST(ApiError, CodesHaveTheirNames) {
-  EXPECT_STREQ(to_string(ErrorCode::index_out_of_range), "index_out_of_range");
-  EXPECT_STREQ(to_string(ErrorCode::non_finite_vertex), "non_finite_vertex");
-  EXPECT_STREQ(to_string(ErrorCode::too_many_triangles), "too_many_triangles");
-  EXPECT_STREQ(to_string(ErrorCode::too_many_references), "too_many_references");
-  EXPECT_STREQ(to_string(ErrorCode::reference_capacity), "reference_capacity");
-  EXPECT_STREQ(to_string(ErrorCode::invalid_view), "invalid_view");
-  EXPECT_STREQ(to_string(ErrorCode::invalid_option), "invalid_option");
-  EXPECT_STREQ(to_string(ErrorCode::unsupported_option), "unsupported_option");
-  EXPECT_STREQ(to_string(ErrorCode::backend_unavailable), "backend_unavailable");
-  EXPECT_STREQ(to_string(ErrorCode::out_of_memory), "out_of_memory");
-}
-
-TEST(ApiError, OptionsHaveTheirNames) {
-  EXPECT_STREQ(to_string(Backend::automatic), "auto");
-  EXPECT_STREQ(to_string(Backend::cpu), "cpu");
-  EXPECT_STREQ(to_string(Backend::cuda), "cuda");
-  EXPECT_STREQ(to_string(References::once), "once");
-  EXPECT_STREQ(to_string(References::budget), "budget");
-  EXPECT_STREQ(to_string(References::all), "all");
-  EXPECT_STREQ(to_string(References::automatic), "auto");
-  EXPECT_STREQ(to_string(Builder::morton), "morton");
-  EXPECT_STREQ(to_string(Builder::sah), "sah");
-  EXPECT_STREQ(to_string(Builder::wu2011), "wu2011");
-  EXPECT_STREQ(to_string(Quality::fast), "fast");
-  EXPECT_STREQ(to_string(Quality::balanced), "balanced");
-  EXPECT_STREQ(to_string(Quality::high), "high");
-  EXPECT_STREQ(to_string(InvalidTriangles::error), "error");
-  EXPECT_STREQ(to_string(InvalidTriangles::skip), "skip");
-  EXPECT_STREQ(to_string(AxisOrder::by_extent), "extent");
-  EXPECT_STREQ(to_string(AxisOrder::cyclic), "cyclic");
-  EXPECT_STREQ(to_string(Stage::validate), "validate");
-  EXPECT_STREQ(to_string(Stage::tight_boxes), "tight_boxes");
-}
-
-TEST(ApiError, StagesCheckTheirArguments) {
-  const Box unit{{0, 0, 0}, {1, 1, 1}};
-  for (const std::uint32_t code_bits : {0u, 65u}) {
-    EXPECT_ERROR(caught([&] { (void)stages::make_lattice(unit, code_bits); }),
-                 ErrorCode::invalid_option, code_bits);
-  }
-  const std::vector<stages::TrunkKey> keys(3);
-  std::vector<std::uint32_t> first(3);
-  for (const std::uint32_t leaf_size : {0u, 1025u}) {
-    EXPECT_ERROR(caught([&] { (void)stages::find_trunks({}, keys, leaf_size, first); }),
-                 ErrorCode::invalid_option, leaf_size);
-  }
-}
-
-// More than 2^31 - 1 references would take tens of GB: what decides is asked directly.
-TEST(ApiError, TooManyReferences) {
-  core::BuildCounts counts;
-  counts.references_needed = max_count;
-  core::AdmitReferences{&counts, max_count}(0);
-  EXPECT_FALSE(counts.status.failed);
-  EXPECT_EQ(counts.references, max_count);
-
-  const std::uint64_t needed = (std::uint64_t{1} << 32) + 5;  // 5 in 32 bits
-  counts.references_needed = needed;
-  counts.trunks = 7;
-  core::AdmitReferences{&counts, max_count}(0);
-  EXPECT_EQ(counts.trunks, 0u) << "a build that failed goes on with nothing";
-  EXPECT_ERROR(caught([&] { core::raise(counts.status, {}); }), ErrorCode::too_many_references,
-               needed);
-}
-
-// Where room was made beforehand, too little of it is an error that says how much there should be.
-TEST(ApiError, ReferenceCapacity) {
-  core::BuildCounts counts;
-  counts.references_needed = 1001;
-  core::AdmitReferences{&counts, 1000}(0);
-  const auto error = caught([&] { core::raise(counts.status, {}); });
-  EXPECT_ERROR(error, ErrorCode::reference_capacity, 1001);
-  EXPECT_NE(error.message.find("1000"), std::string::npos) << error.message;
 }
 
 }  // namespace

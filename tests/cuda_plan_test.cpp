@@ -132,6 +132,21 @@ TEST(CudaPlan, SaysWhatTheMostTrianglesTake) {
   EXPECT_TRUE(machine.stream.launches().empty());
 }
 
+// The largest scenes of the paper have 1.1 million triangles: tree, workspace and a copy of the
+// triangles at once.
+TEST(CudaPlan, PaperScenesFitIn1500Megabytes) {
+  constexpr std::uint64_t n = 1100000;
+  constexpr std::uint64_t limit = 1500000000;
+  constexpr std::uint64_t copy = n * 3 * (sizeof(glm::vec3) + sizeof(std::uint32_t));
+  Machine machine;
+  for (const std::uint32_t code_bits : {0u, 64u}) {
+    const MemoryRequirement need =
+        memory_requirement(machine.executor(), n, {.code_bits = code_bits});
+    EXPECT_LT(need.tree_bytes + need.workspace_bytes + copy, limit) << code_bits << " bits";
+    EXPECT_GT(need.tree_bytes, n * sizeof(Node)) << "not so little that it says nothing";
+  }
+}
+
 TEST(CudaPlan, AnUnusedWorkspaceIsLeftAlone) {
   const scene::Mesh mesh = scene::soup(1000, 66);
   Machine machine;

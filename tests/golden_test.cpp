@@ -14,7 +14,7 @@
 #include <zkd/tree.hpp>
 
 #include "scene/generate.hpp"
-#include "support/platform.hpp"
+#include "support/platform_tree.hpp"
 #include "verify/properties.hpp"
 #include "verify/tree_hash.hpp"
 

@@ -132,8 +132,8 @@ TEST(QueryBruteForce, LargerScenes) {
     for (const scene::Mesh& mesh : {scene::soup(5000, 60), scene::sphere(4), scene::grid(7),
                                     scene::small_in_large(3000, 1e6F, 60), scene::fan(5000)}) {
       const test::PlatformTree tree(mesh.view(), {.references = references});
-      expect_same_answers(tree, mesh.view(), test::RayMaker(mesh, tree.host().view(), 61).all_kinds(480),
-                          count);
+      expect_same_answers(tree, mesh.view(),
+                          test::RayMaker(mesh, tree.host().view(), 61).all_kinds(480), count);
       if (testing::Test::HasFatalFailure()) return;
     }
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Queries as only the CPU has them: spans of host memory, the caller's floating-point mode, threads.
+// Queries as only the CPU has them: spans of host memory, the caller's floating-point mode,
+// threads.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -78,8 +78,8 @@ TEST(QueryFound, NeedleThatPointsAtTheOrigin) {
   const TriangleView view{std::span<const glm::vec3>(corners)};
   const test::PlatformTree tree(view);
   const std::vector<Ray> ray = {{{-0x1.ca6db8p+56F, -0x1.986e58p+124F, -0x1.713966p-83F},
-                0.0F,
-                {0x1.89bf2p+123F, -0x1.d4cddap+126F, 0x1.2e3d5ap+126F}}};
+                                 0.0F,
+                                 {0x1.89bf2p+123F, -0x1.d4cddap+126F, 0x1.2e3d5ap+126F}}};
   EXPECT_FALSE(test::is_hit(tree.closest_hits(ray)[0]));
 }
 

@@ -54,9 +54,9 @@ TEST(QueryInvariance, ScalingTheSceneByPowersOfTwo) {
         if (!exact) continue;  // the input itself underflows or overflows
         const test::PlatformTree tree(scaled.view(), options_for(references));
         ASSERT_EQ(tree.host().view().leaf_count(), at_one.host().view().leaf_count());
-        ASSERT_TRUE(std::equal(
-            tree.host().references().begin(), tree.host().references().end(),
-            at_one.host().references().begin(), at_one.host().references().end()));
+        ASSERT_TRUE(std::equal(tree.host().references().begin(), tree.host().references().end(),
+                               at_one.host().references().begin(),
+                               at_one.host().references().end()));
         const float s = std::ldexp(1.0F, e);
         std::vector<Ray> shorter = rays;  // only the origin is scaled
         std::vector<Ray> along = rays;    // the direction too
@@ -94,8 +94,7 @@ TEST(QueryInvariance, SplittingTheInterval) {
     test::Random random(81);
     for (const References references : policies) {
       const test::PlatformTree tree(m.mesh.view(), options_for(references));
-      const std::vector<Ray> rays =
-          test::RayMaker(m.mesh, tree.host().view(), 81).all_kinds(360);
+      const std::vector<Ray> rays = test::RayMaker(m.mesh, tree.host().view(), 81).all_kinds(360);
       const std::vector<Hit> whole = tree.closest_hits(rays);
       std::vector<Ray> near;
       std::vector<Ray> far;

@@ -208,7 +208,8 @@ TEST_P(QueryRules, SharedVertexBelongsToTheLowestId) {
         const std::vector<glm::vec3> alone = {mesh.positions[f.x], mesh.positions[f.y],
                                               mesh.positions[f.z]};
         const std::vector<Ray> rays = {ray};
-        const Hit other = test::brute_force(tree.host().view(), TriangleView{std::span(alone)}, rays)[0];
+        const Hit other =
+            test::brute_force(tree.host().view(), TriangleView{std::span(alone)}, rays)[0];
         ASSERT_GT(other.t, hit.t) << "triangle " << id << " ties with " << hit.triangle;
       }
     }
@@ -309,9 +310,8 @@ TEST_P(QueryRules, TScalesExactlyWithPowersOfTwoOfTheDirection) {
     for (std::size_t i = 0; i < rays.size(); ++i) {
       Hit want = at_one[i];
       want.t = std::ldexp(want.t, -e);
-      ASSERT_TRUE(same_bits(hits[i], want)) << "2^" << e << ": " << print(hits[i])
-                                            << " instead of " << print(want) << ", "
-                                            << print(rays[i]);
+      ASSERT_TRUE(same_bits(hits[i], want)) << "2^" << e << ": " << print(hits[i]) << " instead of "
+                                            << print(want) << ", " << print(rays[i]);
     }
   }
 }
@@ -327,7 +327,8 @@ TEST_P(QueryRules, DirectionsOfAnyLengthHit) {
   }
 }
 
-// ---- Trees and triangles -------------------------------------------------------------------------
+// ---- Trees and triangles
+// -------------------------------------------------------------------------
 
 TEST_P(QueryRules, EmptyTreeMissesEverything) {
   const test::PlatformTree built = tree_of(TriangleView{});

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The same tree: one hash over threads, instruction sets, repetition, concurrency, permuted input,
-// and triangles that do not count.
+// The same tree: one hash over backends, threads, instruction sets, repetition, permuted input, and
+// triangles that do not count.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <zkd/zkd.hpp>
 
 #include "scene/generate.hpp"
 #include "support/meshes.hpp"
+#include "support/platform_tree.hpp"
 #include "verify/tree_hash.hpp"
 
 namespace zkd {
@@ -47,50 +47,28 @@ bool too_large_for(References references, const test::NamedMesh& m) {
   return references == References::all && m.name == "large random bits";
 }
 
-TEST(TreeSame, OnAnyNumberOfThreadsAndInstructionSet) {
+// Whatever the backend, the number of threads and the instruction set.
+TEST(TreeSame, InEveryWayOfBuilding) {
   for (const test::NamedMesh& m : meshes()) {
     for (const References references : {References::once, References::all}) {
       if (too_large_for(references, m)) continue;
       const BuildOptions options = skipping(references);
-      const std::string want = tree_hash(build({.threads = 1}, m.mesh.view(), options).view());
-      for (int threads = 1; threads <= 4; ++threads) {
-        for (const auto set : {cpu::InstructionSet::automatic, cpu::InstructionSet::portable,
-                               cpu::InstructionSet::avx2}) {
-          const Tree tree =
-              build({.threads = threads, .instructions = set}, m.mesh.view(), options);
-          ASSERT_EQ(tree_hash(tree.view()), want)
-              << m.name << ", " << to_string(references) << ", " << threads << " threads";
-        }
+      const std::string want =
+          tree_hash(build(cpu::Executor{.threads = 1}, m.mesh.view(), options).view());
+      for (const test::WayToBuild& way : test::ways_to_build()) {
+        ASSERT_EQ(tree_hash(way.build(m.mesh.view(), options).view()), want)
+            << m.name << ", " << to_string(references) << ", " << way.name;
       }
     }
   }
 }
 
-TEST(TreeSame, BuiltBySeveralThreadsAtOnce) {
-  const scene::Mesh mesh = scene::soup(20000, 24);
-  for (const References references : {References::once, References::all}) {
-    const std::string want = tree_hash(build(mesh.view(), skipping(references)).view());
-    std::vector<std::string> got(4);
-    std::vector<std::thread> builders;
-    for (std::size_t i = 0; i < got.size(); ++i) {
-      builders.emplace_back([&, i] {
-        for (int again = 0; again < 3; ++again) {
-          got[i] = tree_hash(build({.threads = 2}, mesh.view(), skipping(references)).view());
-          if (got[i] != want) return;
-        }
-      });
-    }
-    for (std::thread& builder : builders) builder.join();
-    for (const std::string& hash : got) EXPECT_EQ(hash, want);
-  }
-}
-
 TEST(TreeSame, HashTellsTreesApart) {
-  const Tree a = build(scene::soup(1000, 25).view());
-  const Tree b = build(scene::soup(1000, 26).view());
+  const Tree a = test::build(scene::soup(1000, 25).view());
+  const Tree b = test::build(scene::soup(1000, 26).view());
   EXPECT_NE(tree_hash(a.view()), tree_hash(b.view()));
   EXPECT_NE(tree_hash(a.view()),
-            tree_hash(build(scene::soup(1000, 25).view(), skipping(References::all)).view()));
+            tree_hash(test::build(scene::soup(1000, 25).view(), skipping(References::all)).view()));
 }
 
 // ---- Permuted input -----------------------------------------------------------------------------
@@ -100,11 +78,11 @@ TEST(TreeSame, ForPermutedTriangles) {
     for (const References references : {References::once, References::all}) {
       if (too_large_for(references, m)) continue;
       const BuildOptions options = skipping(references);
-      const std::string want = tree_hash_mapped(build(m.mesh.view(), options).view(), {});
+      const std::string want = tree_hash_mapped(test::build(m.mesh.view(), options).view(), {});
       for (std::uint64_t seed = 0; seed < 3; ++seed) {
         std::vector<std::uint32_t> permutation;
         const scene::Mesh shuffled = scene::shuffled(m.mesh, seed, &permutation);
-        const Tree tree = build(shuffled.view(), options);
+        const Tree tree = test::build(shuffled.view(), options);
         ASSERT_EQ(tree_hash_mapped(tree.view(), permutation), want)
             << m.name << ", " << to_string(references) << ", shuffle " << seed;
       }
@@ -114,7 +92,7 @@ TEST(TreeSame, ForPermutedTriangles) {
       for (std::uint32_t i = 0; i < back.size(); ++i) {
         back[i] = static_cast<std::uint32_t>(back.size()) - 1 - i;
       }
-      ASSERT_EQ(tree_hash_mapped(build(reversed.view(), options).view(), back), want)
+      ASSERT_EQ(tree_hash_mapped(test::build(reversed.view(), options).view(), back), want)
           << m.name << ", " << to_string(references) << ", reversed";
     }
   }
@@ -123,13 +101,13 @@ TEST(TreeSame, ForPermutedTriangles) {
 TEST(TreeSame, ForRotatedCorners) {
   for (const References references : {References::once, References::all}) {
     scene::Mesh mesh = scene::soup(3000, 27);
-    const std::string want = tree_hash(build(mesh.view(), skipping(references)).view());
+    const std::string want = tree_hash(test::build(mesh.view(), skipping(references)).view());
     for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
       glm::uvec3& f = mesh.faces[i];
       if (i % 3 == 0) f = {f.y, f.z, f.x};
       if (i % 3 == 1) f = {f.x, f.z, f.y};
     }
-    EXPECT_EQ(tree_hash(build(mesh.view(), skipping(references)).view()), want);
+    EXPECT_EQ(tree_hash(test::build(mesh.view(), skipping(references)).view()), want);
   }
 }
 
@@ -137,13 +115,13 @@ TEST(TreeSame, ForNegativeZeros) {
   for (const References references : {References::once, References::all}) {
     scene::Mesh mesh = test::integer_mesh(500, 1, 28);
     for (glm::vec3& p : mesh.positions) p += 0.0F;
-    const std::string want = tree_hash(build(mesh.view(), skipping(references)).view());
+    const std::string want = tree_hash(test::build(mesh.view(), skipping(references)).view());
     for (glm::vec3& p : mesh.positions) {
       for (int a = 0; a < 3; ++a) {
         if (p[a] == 0.0F) p[a] = -0.0F;
       }
     }
-    EXPECT_EQ(tree_hash(build(mesh.view(), skipping(references)).view()), want);
+    EXPECT_EQ(tree_hash(test::build(mesh.view(), skipping(references)).view()), want);
   }
 }
 
@@ -156,7 +134,7 @@ TEST(TreeSame, WithInvalidTrianglesAdded) {
     for (const References references : {References::once, References::all}) {
       if (too_large_for(references, m)) continue;
       const BuildOptions options = skipping(references);
-      const std::string want = tree_hash_mapped(build(m.mesh.view(), options).view(), {});
+      const std::string want = tree_hash_mapped(test::build(m.mesh.view(), options).view(), {});
 
       // At the end, at the front and between: zero area far away, NaN, infinity.
       scene::Mesh mesh = m.mesh;
@@ -180,7 +158,7 @@ TEST(TreeSame, WithInvalidTrianglesAdded) {
         old_ids.push_back(i);
       }
       mesh.faces = faces;
-      const Tree tree = build(mesh.view(), options);
+      const Tree tree = test::build(mesh.view(), options);
       ASSERT_EQ(tree_hash_mapped(tree.view(), old_ids), want)
           << m.name << ", " << to_string(references);
       EXPECT_GE(tree.statistics().skipped_zero_area + tree.statistics().skipped_non_finite,
@@ -192,13 +170,14 @@ TEST(TreeSame, WithInvalidTrianglesAdded) {
 TEST(TreeSame, WhateverTheFormOfTheView) {
   const scene::Mesh mesh = scene::sphere(3);
   for (const References references : {References::once, References::all}) {
-    const std::string want = tree_hash(build(mesh.view(), skipping(references)).view());
+    const std::string want = tree_hash(test::build(mesh.view(), skipping(references)).view());
     std::vector<glm::vec3> soup;
     for (const glm::uvec3& f : mesh.faces) {
       for (int c = 0; c < 3; ++c) soup.push_back(mesh.positions[f[c]]);
     }
     EXPECT_EQ(
-        tree_hash(build(TriangleView{std::span(std::as_const(soup))}, skipping(references)).view()),
+        tree_hash(
+            test::build(TriangleView{std::span(std::as_const(soup))}, skipping(references)).view()),
         want);
     std::vector<float> wide(mesh.positions.size() * 8, 7.0F);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
@@ -206,7 +185,7 @@ TEST(TreeSame, WhateverTheFormOfTheView) {
     }
     const TriangleView strided =
         TriangleView::strided(wide.data(), mesh.positions.size(), 32, mesh.faces);
-    EXPECT_EQ(tree_hash(build(strided, skipping(references)).view()), want);
+    EXPECT_EQ(tree_hash(test::build(strided, skipping(references)).view()), want);
   }
 }
 

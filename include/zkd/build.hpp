@@ -18,8 +18,8 @@ namespace zkd {
 /// Real-Time Ray Tracing, I3D 2014).
 ///
 /// options.backend says where: `automatic` takes CUDA if the program links zkd::cuda and a device
-/// answers, else the CPU, and Tree::options().backend says which it was. Either way triangles are in
-/// host memory and the tree is too; zkd/cuda/build.hpp leaves it on the device.
+/// answers, else the CPU, and Tree::options().backend says which it was. Either way triangles are
+/// in host memory and the tree is too; zkd/cuda/build.hpp leaves it on the device.
 ///
 /// Blocks until the tree is finished. For given triangles and options the tree has the same bytes
 /// on every backend, instruction set and thread count; for permuted triangles it is the same tree
@@ -30,8 +30,9 @@ namespace zkd {
 /// number of digits); with `all` O((n + references) * depth).
 ///
 /// Throws Error: index_out_of_range, non_finite_vertex, too_many_triangles, too_many_references,
-/// invalid_view, invalid_option, unsupported_option, backend_unavailable, out_of_memory. When it
-/// throws, everything allocated has been returned.
+/// invalid_view, invalid_option, unsupported_option, backend_unavailable, out_of_memory; and on
+/// CUDA reference_capacity (if the option is not 0) and device_failure. When it throws, everything
+/// allocated has been returned.
 [[nodiscard]] ZKD_API Tree build(const TriangleView& triangles, const BuildOptions& options = {});
 
 /// The same, on these threads and out of this memory. `options.backend` is not looked at.

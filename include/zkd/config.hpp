@@ -4,6 +4,10 @@
 // link to them.
 #pragma once
 
+#if __cplusplus < 202002L
+#error "zkd needs C++20: compile with -std=c++20 (nvcc does not by default)"
+#endif
+
 #define ZKD_VERSION_MAJOR 0
 #define ZKD_VERSION_MINOR 1
 #define ZKD_VERSION_PATCH 0

@@ -9,8 +9,15 @@
 #include <limits>
 #include <span>
 
+#if defined(__NVCC__)  // glm puts host and device markers on defaulted functions
+#pragma nv_diagnostic push
+#pragma nv_diag_suppress 20012
+#endif
 #include <glm/ext/vector_float3.hpp>
 #include <glm/ext/vector_uint3.hpp>
+#if defined(__NVCC__)
+#pragma nv_diagnostic pop
+#endif
 
 #include <zkd/config.hpp>
 

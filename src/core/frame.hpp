@@ -35,11 +35,13 @@ struct SceneFrame {
   Box bounds;
   double scale = 1.0;
   double largest = 0.0;        ///< magnitude of any coordinate
+  std::int32_t exponent = 0;   ///< log2 of scale
   std::int32_t finest = -149;  ///< see finest_cell
 
   SceneFrame() = default;
-  ZKD_HOST_DEVICE explicit SceneFrame(const Box& scene)
-      : scale(power_of_two(scale_exponent(scene))), finest(finest_cell(scale_exponent(scene))) {
+  ZKD_HOST_DEVICE explicit SceneFrame(const Box& scene) : exponent(scale_exponent(scene)) {
+    scale = power_of_two(exponent);
+    finest = finest_cell(exponent);
     for (int a = 0; a < 3; ++a) {
       bounds.lo[a] = scene.lo[a] * static_cast<float>(scale) + 0.0F;
       bounds.hi[a] = scene.hi[a] * static_cast<float>(scale) + 0.0F;

@@ -37,12 +37,15 @@ namespace zkd::core {
 /// Small results of the stages, in the backend's memory.
 struct BuildState {
   ValidationReport report;
+  Link root;
   BuildCounts counts;
   Lattice lattice;
   MortonCoder coder;
   SceneFrame frame;
-  Link root;
 };
+// It is copied as a whole, and a checker of memory takes padding for a number that nobody wrote.
+static_assert(sizeof(BuildState) == sizeof(ValidationReport) + sizeof(Link) + sizeof(BuildCounts) +
+                                        sizeof(Lattice) + sizeof(MortonCoder) + sizeof(SceneFrame));
 
 /// What a tree consists of, but for its references.
 struct TreeArrays {
@@ -100,7 +103,7 @@ struct PrepareScene {
     state->counts.listed = valid;
     state->counts.left_out = given - valid;
     judge(state->report, triangles, invalid, state->counts);
-    if (state->counts.status.failed) state->report.bounds = Box{};
+    if (state->counts.status.failed != 0) state->report.bounds = Box{};
     state->root = Link{};
     state->frame = SceneFrame(state->report.bounds);
     state->lattice =
@@ -123,7 +126,7 @@ struct WriteHeader {
   TreeHeader* header;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    const bool failed = state->counts.status.failed;
+    const bool failed = state->counts.status.failed != 0;
     header->bounds = failed ? Box{} : state->report.bounds;
     header->scale = static_cast<float>(state->frame.scale);
     header->root = failed ? Link{} : state->root;

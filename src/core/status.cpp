@@ -33,7 +33,7 @@ std::string text_of(const BuildStatus& status, const TriangleView& triangles) {
 }  // namespace
 
 void raise(const BuildStatus& status, const TriangleView& triangles) {
-  if (status.failed) throw Error(status.code, status.offender, text_of(status, triangles));
+  if (status.failed != 0) throw Error(status.code, status.offender, text_of(status, triangles));
 }
 
 }  // namespace zkd::core

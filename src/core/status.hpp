@@ -20,7 +20,7 @@ namespace zkd::core {
 
 /// Why a build came to no tree.
 struct BuildStatus {
-  bool failed = false;
+  std::uint32_t failed = 0;  ///< 1: yes
   ErrorCode code{};
   std::uint64_t offender = 0;    ///< as Error::offender
   std::uint64_t detail[2] = {};  ///< what else the message tells; see raise
@@ -44,7 +44,7 @@ struct BuildCounts {
 
   ZKD_HOST_DEVICE void fail(ErrorCode code, std::uint64_t offender, std::uint64_t first = 0,
                             std::uint64_t second = 0) {
-    status = {true, code, offender, {first, second}};
+    status = {1, code, offender, {first, second}};
     given = listed = left_out = trunks = nodes = references = 0;
   }
 };

@@ -24,7 +24,8 @@
 //   take(layout, counts...)            arrays until the build ends
 //   keep(value)                        a copy in the backend's memory until the build ends, for
 //                                      functors to point to
-//   read(pointer)                      what it points to, when all that was enqueued is done: waits.
+//   read(pointer)                      what it points to, when all that was enqueued is done:
+//   waits.
 //                                      Builds do not, single stages do (core/stages)
 //   allocate_tree, allocate_references the arrays of the tree, from then on at header(), nodes(),
 //                                      leaf_offsets(), references()
@@ -53,7 +54,9 @@ inline constexpr Count one{nullptr, 1};
 
 /// Functors that have to be made ready (see above).
 template <class Functor>
-concept Loads = requires(Functor& f) { f.load(); };
+concept Loads = requires(Functor& f) {
+  f.load();
+};
 
 /// Keys and values, and room to move them to and fro.
 template <class Key>

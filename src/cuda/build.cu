@@ -4,6 +4,7 @@
 #include <zkd/cuda/build.hpp>
 
 #include "cuda/build_steps.hpp"
+#include "cuda/current_device.hpp"
 #include "cuda/device.cuh"
 #include "cuda/transfer.hpp"
 
@@ -40,30 +41,49 @@ Tree to_device(const Executor& executor, const zkd::Tree& tree, const TriangleVi
   return copy_to_device(device, tree, triangles);
 }
 
+namespace {
+
+/// The device of a tree, to ask what its last build came to.
+class TreeDevice {
+ public:
+  TreeDevice(int number, Stream stream, bool incomplete)
+      : on_(number), device_(Executor{.stream = stream}) {
+    if (incomplete)
+      throw Error(ErrorCode::device_failure, 0, "the last rebuild of this tree threw half-way");
+  }
+  operator Device&() { return device_; }
+
+ private:
+  OnDevice on_;
+  Device device_;
+};
+
+}  // namespace
+
 void Tree::check() const { check(stream_); }
 
 void Tree::check(Stream stream) const {
   if (record_ == nullptr) return;
-  Device device(Executor{.stream = stream});
-  (void)checked_state(device, *this, record_);
+  TreeDevice device(device_, stream, incomplete_);
+  (void)checked_state<Device>(device, *this, record_);
 }
 
 Statistics Tree::statistics() const {
   if (record_ == nullptr) return {};
-  Device device(Executor{.stream = stream_});
-  return statistics_of(*this, checked_state(device, *this, record_), workspace_bytes_);
+  TreeDevice device(device_, stream_, incomplete_);
+  return statistics_of(*this, checked_state<Device>(device, *this, record_), workspace_bytes_);
 }
 
 Lattice Tree::lattice() const {
   if (record_ == nullptr) return {};
-  Device device(Executor{.stream = stream_});
-  return checked_state(device, *this, record_).lattice;
+  TreeDevice device(device_, stream_, incomplete_);
+  return checked_state<Device>(device, *this, record_).lattice;
 }
 
 zkd::Tree Tree::to_host(std::pmr::memory_resource* memory) const {
   if (record_ == nullptr) return {};
-  Device device(Executor{.stream = stream_});
-  return copy_to_host(device, *this, record_, workspace_bytes_, memory);
+  TreeDevice device(device_, stream_, incomplete_);
+  return copy_to_host<Device>(device, *this, record_, workspace_bytes_, memory);
 }
 
 }  // namespace cuda

@@ -3,7 +3,7 @@
 // A build on a device, from the triangles to the owner of the tree: plan, memory, passes. Host code
 // over a Device (cuda/backend.hpp), which besides enqueuing passes says
 //
-//   stream(), memory()             where, and whose memory
+//   stream(), number(), memory()   where, and whose memory
 //   is_host_memory(pointer)        whether the device cannot be sent there
 //   copy_to_device(to, from, bytes)    enqueues
 //   copy_to_host(to, from, bytes)      waits
@@ -37,12 +37,15 @@ struct TreeAccess {
   BuildOptions& options() { return tree.options_; }
   std::uint64_t& triangle_capacity() { return tree.triangle_capacity_; }
   std::size_t& workspace_bytes() { return tree.workspace_bytes_; }
+  bool& incomplete() { return tree.incomplete_; }
   core::BuildState*& record() { return tree.record_; }
 
   /// The tree owns these from now on.
-  void own(MemoryResource& memory, Stream stream, DeviceBlock& block, DeviceBlock& triangles) {
-    tree.memory_ = &memory;
-    tree.stream_ = stream;
+  template <class Device>
+  void own(const Device& device, DeviceBlock& block, DeviceBlock& triangles) {
+    tree.memory_ = &device.memory();
+    tree.stream_ = device.stream();
+    tree.device_ = device.number();
     tree.block_.bytes = block.bytes();
     tree.block_.data = block.release();
     tree.triangle_block_.bytes = triangles.bytes();
@@ -221,7 +224,7 @@ Tree build_with(Device& device, const Executor& executor, const TriangleView& tr
   access.options().backend = zkd::Backend::cuda;
   access.triangle_capacity() = capacity.triangles;
   access.workspace_bytes() = plan.workspace_bytes;
-  access.own(device.memory(), device.stream(), tree_block, triangle_block);
+  access.own(device, tree_block, triangle_block);
   return tree;
 }
 
@@ -258,7 +261,9 @@ void rebuild_on(Device& device, const Executor& executor, Tree& tree,
   const Workspace<Device> workspace(device, executor, plan.workspace_bytes);
   const TriangleView on_device = upload.enqueue(access.triangle_block());
   PlannedMemory memory(access.block(), workspace.data(), plan);
+  access.incomplete() = true;
   run_passes(device, memory, on_device, access.options(), capacity);
+  access.incomplete() = false;
   access.triangles() = on_device;
 }
 

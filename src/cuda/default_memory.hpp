@@ -7,7 +7,7 @@
 
 namespace zkd::cuda {
 
-/// The current device's default pool; plain allocations on devices without pools.
-MemoryResource& default_memory();
+/// The default pool of a device; plain allocations on devices without pools.
+MemoryResource& default_memory(int device);
 
 }  // namespace zkd::cuda

@@ -26,6 +26,7 @@
 
 #include "core/compress.hpp"
 #include "core/verbs.hpp"
+#include "cuda/current_device.hpp"
 #include "cuda/default_memory.hpp"
 #include "cuda/error.hpp"
 #include "cuda/iterators.cuh"
@@ -114,15 +115,14 @@ class Device {
   /// Throws Error backend_unavailable where no device answers.
   explicit Device(const Executor& executor)
       : executor_(executor),
-        memory_(executor.memory != nullptr ? executor.memory : &default_memory()) {
-    int device = 0;
-    ZKD_CUDA_CHECK(cudaGetDevice(&device));
-  }
+        number_(current_device()),
+        memory_(executor.memory != nullptr ? executor.memory : &default_memory(number_)) {}
   ~Device() { end_range(); }
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
   [[nodiscard]] Stream stream() const { return executor_.stream; }
+  [[nodiscard]] int number() const { return number_; }
   [[nodiscard]] MemoryResource& memory() const { return *memory_; }
 
   // --- passes ---
@@ -154,9 +154,9 @@ class Device {
   void select(void* scratch, std::size_t& bytes, core::Count count, Functor f, std::uint32_t* out,
               std::uint32_t* total) {
     if (count.bound == 0) return none(scratch, total);
-    ZKD_CUDA_CHECK(cub::DeviceSelect::If(scratch, bytes, numbers(), out, total,
-                                         static_cast<int>(count.bound),
-                                         SelectActual<Functor>{count, f}, stream()));
+    ZKD_CUB_CHECK(cub::DeviceSelect::If(scratch, bytes, numbers(), out, total,
+                                        static_cast<int>(count.bound),
+                                        SelectActual<Functor>{count, f}, stream()));
   }
 
   template <class Functor, class Total>
@@ -166,10 +166,10 @@ class Device {
     // A value may cost a walk through the tree: a pass of its own computes it, once, with as many
     // threads as there are elements.
     if (scratch != nullptr) for_each(count, WriteValue<Functor>{f, out});
-    ZKD_CUDA_CHECK(cub::DeviceScan::ExclusiveScan(
+    ZKD_CUB_CHECK(cub::DeviceScan::ExclusiveScan(
         scratch, bytes, thrust::make_transform_iterator(numbers(), ReadActual{count, out}),
-        SumIterator<Total>(count, out, total), Plus{}, std::uint64_t{0},
-        count.bound + 1, stream()));
+        SumIterator<Total>(count, out, total), Plus{}, std::uint64_t{0}, count.bound + 1,
+        stream()));
   }
 
   template <class T, class Functor>
@@ -179,7 +179,7 @@ class Device {
     // The number of runs is written in front of CUB's own memory.
     void* rest = scratch == nullptr ? nullptr : static_cast<std::byte*>(scratch) + run_count_bytes;
     std::size_t rest_bytes = bytes - (scratch == nullptr ? bytes : run_count_bytes);
-    ZKD_CUDA_CHECK(cub::DeviceReduce::ReduceByKey(
+    ZKD_CUB_CHECK(cub::DeviceReduce::ReduceByKey(
         rest, rest_bytes, thrust::make_transform_iterator(numbers(), segment_of), NothingIterator{},
         thrust::make_transform_iterator(numbers(), SegmentValue<T, Functor>{segment_of, f}),
         SegmentIterator<T>(segments, out), static_cast<std::uint32_t*>(scratch), Combine{},
@@ -195,9 +195,9 @@ class Device {
               buffers.keys, buffers.values);
     cub::DoubleBuffer<Key> keys(buffers.keys, buffers.other_keys);
     cub::DoubleBuffer<std::uint32_t> values(buffers.values, buffers.other_values);
-    ZKD_CUDA_CHECK(cub::DeviceRadixSort::SortPairs(scratch, bytes, keys, values,
-                                                   static_cast<int>(count.bound), 0,
-                                                   static_cast<int>(bits), stream()));
+    ZKD_CUB_CHECK(cub::DeviceRadixSort::SortPairs(scratch, bytes, keys, values,
+                                                  static_cast<int>(count.bound), 0,
+                                                  static_cast<int>(bits), stream()));
     if (scratch != nullptr)
       buffers = {keys.Current(), values.Current(), keys.Alternate(), values.Alternate()};
   }
@@ -258,6 +258,7 @@ class Device {
   static constexpr std::size_t run_count_bytes = 256;
 
   Executor executor_;
+  int number_;
   MemoryResource* memory_;
   const char* stage_ = "a pass";  ///< what is being enqueued
   bool in_range_ = false;

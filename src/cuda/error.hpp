@@ -31,6 +31,11 @@ inline void check(cudaError_t status, const char* call, const char* file, int li
     case cudaErrorInsufficientDriver:
     case cudaErrorNoKernelImageForDevice:
     case cudaErrorUnsupportedPtxVersion:
+    case cudaErrorInvalidDeviceFunction:
+    case cudaErrorSystemNotReady:
+    case cudaErrorSystemDriverMismatch:
+    case cudaErrorCompatNotSupportedOnDevice:
+    case cudaErrorDevicesUnavailable:
     case cudaErrorStubLibrary:
       code = ErrorCode::backend_unavailable;
       break;
@@ -52,3 +57,7 @@ inline void check(cudaError_t status, const char* call, const char* file, int li
 
 // A macro for the place of the call: nvcc 12.0 cannot evaluate std::source_location.
 #define ZKD_CUDA_CHECK(call) ::zkd::cuda::check((call), #call, __FILE__, __LINE__)
+
+// CUB asks for the last error after its launches: one that the program has left there would pass
+// for ours.
+#define ZKD_CUB_CHECK(call) ((void)cudaGetLastError(), ZKD_CUDA_CHECK(call))

@@ -13,8 +13,18 @@
 namespace zkd::cuda {
 namespace {
 
-/// The oldest device that the library has code for: 10 * major + minor.
-constexpr int oldest_capability = 75;
+/// What the library has code for: 10 * major + minor, after a 0. Machine code runs on devices of
+/// the same major version from its minor version on, PTX on all later ones.
+constexpr int machine_code[] = {ZKD_CUDA_MACHINE_CODE};
+constexpr int ptx[] = {ZKD_CUDA_PTX};
+
+bool has_code_for(int capability) {
+  for (const int code : machine_code)
+    if (code / 10 == capability / 10 && code <= capability) return true;
+  for (const int code : ptx)
+    if (code != 0 && code <= capability) return true;
+  return false;
+}
 
 void find_device() {
   int count = 0;
@@ -25,10 +35,10 @@ void find_device() {
   ZKD_CUDA_CHECK(cudaGetDevice(&device));
   ZKD_CUDA_CHECK(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device));
   ZKD_CUDA_CHECK(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device));
-  if (10 * major + minor < oldest_capability)
+  if (!has_code_for(10 * major + minor))
     throw Error(ErrorCode::backend_unavailable, 0,
                 "the device has compute capability " + std::to_string(major) + "." +
-                    std::to_string(minor) + "; zkd has code for 7.5 and later");
+                    std::to_string(minor) + ", for which this zkd was not compiled");
 }
 
 }  // namespace
@@ -62,7 +72,10 @@ StageTimer::~StageTimer() {
 }
 
 void StageTimer::mark(Stage next, Stream stream) {
-  complete_ = next == Stage::count;
+  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+  ZKD_CUDA_CHECK(cudaStreamIsCapturing(stream, &capture));
+  complete_ = next == Stage::count && capture == cudaStreamCaptureStatusNone;
+  if (capture != cudaStreamCaptureStatusNone) return;
   ZKD_CUDA_CHECK(cudaEventRecord(events_[static_cast<std::size_t>(next)], stream));
 }
 

@@ -40,6 +40,12 @@ class DeviceBlock {
     if (data_ == nullptr)
       throw Error(ErrorCode::out_of_memory, bytes,
                   "the device's memory resource refused " + std::to_string(bytes) + " bytes");
+    if (reinterpret_cast<std::uintptr_t>(data_) % block_alignment != 0) {
+      memory.deallocate(data_, bytes, stream);
+      throw Error(ErrorCode::invalid_option, 0,
+                  "the memory resource gave a block that is not aligned to " +
+                      std::to_string(block_alignment) + " bytes");
+    }
   }
   DeviceBlock(DeviceBlock&& other) noexcept
       : memory_(other.memory_),

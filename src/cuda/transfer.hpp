@@ -134,7 +134,7 @@ Tree copy_to_device(Device& device, const zkd::Tree& from, const TriangleView& t
   access.triangles() = upload.enqueue(triangle_block.data());
   access.options() = from.options();
   access.options().backend = zkd::Backend::cuda;
-  access.own(device.memory(), device.stream(), tree_block, triangle_block);
+  access.own(device, tree_block, triangle_block);
   return tree;
 }
 

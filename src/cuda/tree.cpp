@@ -19,8 +19,10 @@ void Tree::swap(Tree& other) noexcept {
   std::swap(record_, other.record_);
   std::swap(triangle_capacity_, other.triangle_capacity_);
   std::swap(workspace_bytes_, other.workspace_bytes_);
+  std::swap(incomplete_, other.incomplete_);
   std::swap(memory_, other.memory_);
   std::swap(stream_, other.stream_);
+  std::swap(device_, other.device_);
 }
 
 Tree::Tree(Tree&& other) noexcept : Tree() { swap(other); }

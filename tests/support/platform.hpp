@@ -13,7 +13,7 @@
 //                             host values, passed as a span, brought back by download()
 //   upload(...)               an Array of these values; a TriangleView that may be passed to stages
 //   thinning                  where a call costs launches and waits, tests with thousands of tiny
-//                             calls make one in so many
+//                             calls make one in so many (a prime, so that every option stays)
 //   sort_leaves_passes_out    whether stages::radix_sort looks for passes that are not needed
 //
 // Tests of whole trees need none of it: see support/platform_tree.hpp.

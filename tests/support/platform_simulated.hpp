@@ -18,7 +18,7 @@ namespace zkd::test {
 
 using Executor = simulated::Executor;
 
-inline constexpr std::uint32_t thinning = 16;
+inline constexpr std::uint32_t thinning = 17;
 inline constexpr bool sort_leaves_passes_out = false;
 
 inline Executor executor(int = 0) {

@@ -23,7 +23,8 @@ namespace zkd::test {
 /// Which backend builds here, as trees record it.
 Backend backend();
 
-/// Tests with hundreds of builds make one in so many: 1, but where all runs in simulation.
+/// Tests with hundreds of builds make one in so many (a prime, so that every option stays): all of
+/// them, but where they run in simulation.
 std::uint32_t build_thinning();
 
 /// Code that rays are traced with.
@@ -31,7 +32,10 @@ enum class Walk { automatic, portable, avx2 };
 
 /// The ones that this platform has.
 std::vector<Walk> walks();
-const char* name(Walk walk);
+
+inline const char* name(Walk walk) {
+  return walk == Walk::portable ? "portable" : walk == Walk::avx2 ? "avx2" : "automatic";
+}
 
 /// A tree in the memory of the platform, its triangles there as well.
 class PlatformTree {

@@ -29,8 +29,7 @@ struct PlatformTree::There {
 
 PlatformTree::PlatformTree(const TriangleView& triangles, const BuildOptions& options)
     : there_(new There{upload(triangles), {}, {}}) {
-  there_->tree =
-      zkd::build(executor(), there_->triangles, with_room(there_->triangles, options));
+  there_->tree = zkd::build(executor(), there_->triangles, with_room(there_->triangles, options));
   there_->on_host = there_->tree.to_host();
 }
 PlatformTree::PlatformTree(const Tree& tree, const TriangleView& triangles)
@@ -122,22 +121,21 @@ std::vector<WayToBuild> ways_to_build() {
     rebuild(executor, tree, triangles);
     return tree.to_host();
   };
-  return {
-      {"no executor",
-       [](const auto& triangles, const auto& options) { return zkd::build(triangles, options); }},
-      {"from host memory",
-       [=](const auto& triangles, const auto& options) {
-         return counted(triangles, options, in_one_go);
-       }},
-      {"from device memory",
-       [=](const auto& triangles, const auto& options) {
-         if (!readable(triangles)) return counted(triangles, options, in_one_go);
-         return counted(upload(triangles), options, in_one_go);
-       }},
-      {"twice in one workspace", [=](const auto& triangles, const auto& options) {
-         if (!readable(triangles)) return counted(triangles, options, twice);
-         return counted(upload(triangles), options, twice);
-       }}};
+  return {{"no executor", [](const auto& triangles,
+                             const auto& options) { return zkd::build(triangles, options); }},
+          {"from host memory",
+           [=](const auto& triangles, const auto& options) {
+             return counted(triangles, options, in_one_go);
+           }},
+          {"from device memory",
+           [=](const auto& triangles, const auto& options) {
+             if (!readable(triangles)) return counted(triangles, options, in_one_go);
+             return counted(upload(triangles), options, in_one_go);
+           }},
+          {"twice in one workspace", [=](const auto& triangles, const auto& options) {
+             if (!readable(triangles)) return counted(triangles, options, twice);
+             return counted(upload(triangles), options, twice);
+           }}};
 }
 
 }  // namespace zkd::test

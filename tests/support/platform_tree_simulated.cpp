@@ -38,7 +38,7 @@ BuildOptions with_room(const simulated::Executor& executor, const TriangleView& 
 
 Backend backend() { return Backend::cuda; }
 
-std::uint32_t build_thinning() { return 16; }
+std::uint32_t build_thinning() { return 17; }
 
 std::vector<Walk> walks() { return {Walk::automatic}; }
 
@@ -80,12 +80,10 @@ std::vector<Hit> PlatformTree::closest_hits(std::span<const Ray> rays, Walk,
 std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk) const {
   const Array<Ray> uploaded(rays);
   Array<std::uint8_t> occluded(rays.size(), 7);
-  trace(uploaded,
-        [tree = there_->tree.view(), triangles = there_->tree.triangles(),
-         out = std::span<std::uint8_t>(occluded).data()](const Ray& ray, std::size_t i) {
-          out[i] =
-              core::trace<true, core::FusedBoxTest>(tree, triangles, ray, nullptr).found() ? 1 : 0;
-        });
+  trace(uploaded, [tree = there_->tree.view(), triangles = there_->tree.triangles(),
+                   out = std::span<std::uint8_t>(occluded).data()](const Ray& ray, std::size_t i) {
+    out[i] = core::trace<true, core::FusedBoxTest>(tree, triangles, ray, nullptr).found() ? 1 : 0;
+  });
   return occluded.download();
 }
 
@@ -129,8 +127,8 @@ Tree counted(const TriangleView& triangles, const BuildOptions& options, bool up
     EXPECT_FALSE(machine.memory.misused());
   };
   try {
-    Tree tree =
-        upload_first && readable(triangles) ? build_there(upload(triangles)) : build_there(triangles);
+    Tree tree = upload_first && readable(triangles) ? build_there(upload(triangles))
+                                                    : build_there(triangles);
     expect_all_given_back();
     return tree;
   } catch (const Error&) {
@@ -142,13 +140,12 @@ Tree counted(const TriangleView& triangles, const BuildOptions& options, bool up
 }  // namespace
 
 std::vector<WayToBuild> ways_to_build() {
-  return {{"from host memory",
-           [](const auto& triangles, const auto& options) {
-             return counted(triangles, options, false);
-           }},
-          {"from device memory", [](const auto& triangles, const auto& options) {
-             return counted(triangles, options, true);
-           }}};
+  return {
+      {"from host memory", [](const auto& triangles,
+                              const auto& options) { return counted(triangles, options, false); }},
+      {"from device memory", [](const auto& triangles, const auto& options) {
+         return counted(triangles, options, true);
+       }}};
 }
 
 }  // namespace zkd::test

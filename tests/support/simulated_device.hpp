@@ -101,6 +101,7 @@ class Device {
         memory_(executor.memory != nullptr ? executor.memory : &Memory::by_default()) {}
 
   [[nodiscard]] cuda::Stream stream() const { return executor_.stream; }
+  [[nodiscard]] static int number() { return 0; }
   [[nodiscard]] cuda::MemoryResource& memory() const { return *memory_; }
   [[nodiscard]] static bool is_host_memory(const void* pointer) {
     return !AddressSpace::instance().contains(pointer);

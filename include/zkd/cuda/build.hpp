@@ -25,6 +25,11 @@ namespace zkd {
 /// the executor brings one; nothing else is allocated. See memory_requirement(). The number of
 /// kernels depends on counts and options only.
 ///
+/// What the driver does by itself: it loads kernels when they are first launched, for which the
+/// first build of a process may wait, and it keeps the stacks of all threads that fit on the
+/// device, some 3 KB a thread once `all` has been built (0.8 GB on the largest devices), else 1 KB.
+/// A build before the first frame, or before a capture, gets both over with.
+///
 /// Throws Error at once: what can be known beforehand (too_many_triangles, invalid_view,
 /// invalid_option, unsupported_option), backend_unavailable, device_failure, out_of_memory; `all`
 /// without a reference_capacity is invalid_option: see analyse(). What only the device can know is
@@ -41,6 +46,9 @@ namespace zkd {
 /// With an executor that brings a workspace nothing is allocated and nothing synchronised, so that
 /// a CUDA graph can capture the call; each replay builds from what is in the arrays then. A capture
 /// reads host memory at each replay.
+///
+/// If it throws device_failure half-way, the tree is in no state until it is rebuilt, and
+/// cuda::Tree::check() says so; a capture that was open is still the caller's to end.
 ZKD_API void rebuild(const cuda::Executor& executor, cuda::Tree& tree,
                      const TriangleView& triangles);
 
@@ -63,7 +71,7 @@ ZKD_API void rebuild(const cuda::Executor& executor, cuda::Tree& tree,
 
 namespace cuda {
 
-/// Whether a CUDA device answers that this library has code for. Where not, and `why` is given,
+/// Whether a CUDA device answers that this library was compiled for. Where not, and `why` is given,
 /// *why says so: no device, a driver that is too old, ... Makes no context. Never throws.
 [[nodiscard]] ZKD_API bool available(std::string* why = nullptr) noexcept;
 

@@ -21,10 +21,11 @@
 // Compile such kernels without it, and call the fast functions (__sinf, ...) by name where wanted.
 //
 // What it costs a kernel: a thread keeps its stack of nodes in local memory, 8 * max_depth = 768
-// bytes, of which few are touched; and about 100 registers, since a prepared ray is held in single
-// and in double precision. Give the kernel __launch_bounds__ with the block size in use (128 is a
-// good first guess): nvcc then knows how many registers a thread may have. The code is inlined, so
-// each call in the source is a copy of the whole walk: better one call in a loop than several.
+// bytes for each call in the source, few of them touched; and about 100 registers, since a prepared
+// ray is held in single and in double precision. Give the kernel __launch_bounds__ with the block
+// size in use (128 is a good first guess): nvcc then knows how many registers a thread may have.
+// The code is inlined, so each call in the source is a copy of the whole walk: better one call in a
+// loop than several.
 //
 // For nvcc (12 or later, C++20, sm_75 or newer). Other compilers find no function here, so that a
 // header of a program may include this one on both sides.

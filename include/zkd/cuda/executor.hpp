@@ -38,7 +38,7 @@ class ZKD_API MemoryResource {
 
 /// How long each stage of a build took on the device. Takes its readings between stages, as events
 /// on the stream: a few microseconds each, so total times are taken without it. Not for use by two
-/// builds at once.
+/// builds at once. A build that a graph captures is not timed.
 class ZKD_API StageTimer {
  public:
   /// Makes its events on the current device. Throws Error backend_unavailable, device_failure.
@@ -61,14 +61,16 @@ class ZKD_API StageTimer {
 };
 
 /// Passed to build(), to queries and to stages. A value: copy it freely. Work runs on the device
-/// that is current when the call is made, which must be the stream's.
+/// that is current when the call is made, which must be the stream's. A call may clear an error of
+/// an earlier CUDA call that the program has not asked for yet (cudaGetLastError).
 struct Executor {
   /// Work is enqueued here, in order. Null: the default stream.
   Stream stream = nullptr;
 
   /// What a build allocates comes from here; null: cudaMallocAsync from the device's default pool
-  /// (cudaMalloc on devices that have no pools). Not owned; it must outlive the trees built with
-  /// it.
+  /// (cudaMalloc on devices that have no pools), which gives memory back to the system whenever the
+  /// program synchronises, unless its release threshold is raised. Not owned; it must outlive the
+  /// trees built with it.
   MemoryResource* memory = nullptr;
 
   /// Device memory for what a build needs besides its tree, aligned to 256; null: allocated for the

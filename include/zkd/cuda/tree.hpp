@@ -29,8 +29,10 @@ namespace zkd::cuda {
 /// that far, and throws what went wrong in the build. A build that failed leaves an empty tree,
 /// which every ray misses.
 ///
-/// Movable, not copyable. Its memory is given back in the order of the stream it was built on, which
-/// must outlive it. The destructor does not wait.
+/// Movable, not copyable. Its memory is given back in the order of the stream it was built on,
+/// which must outlive it. The destructor does not wait. With several devices: what is asked of a
+/// tree goes to the device that it was built on, whichever is current; a MemoryResource of the
+/// caller's has to see to that itself.
 class ZKD_API Tree {
  public:
   /// An empty tree: every ray misses.
@@ -54,7 +56,8 @@ class ZKD_API Tree {
   [[nodiscard]] const BuildOptions& options() const noexcept { return options_; }
 
   /// Waits. Throws Error if the build failed: index_out_of_range, non_finite_vertex,
-  /// too_many_references, reference_capacity, with the text that the CPU has; or device_failure.
+  /// too_many_references, reference_capacity, with the text that the CPU has; or device_failure,
+  /// also where a rebuild() threw half-way and left the tree in no state.
   /// `stream`: where the build was enqueued, if not on the stream it was first built on (a graph
   /// that replays it).
   void check() const;
@@ -92,8 +95,10 @@ class ZKD_API Tree {
   core::BuildState* record_ = nullptr;  // what the last build found, in block_
   std::uint64_t triangle_capacity_ = 0;
   std::size_t workspace_bytes_ = 0;  // that the build needed
+  bool incomplete_ = false;          // a rebuild could not be enqueued whole
   MemoryResource* memory_ = nullptr;
   Stream stream_ = nullptr;
+  int device_ = 0;
 };
 
 }  // namespace zkd::cuda
