@@ -39,17 +39,18 @@ TEST_P(QueryDeviceBox, LeavesOutNoHit) {
       const std::vector<Hit> want = test::brute_force(tree.view(), triangles, rays);
       for (std::size_t i = 0; i < rays.size(); ++i) {
         TraversalCost cost;
-        const core::Candidate closest =
-            core::trace<false, core::FusedBoxTest>(tree.view(), triangles, rays[i], &cost);
-        const core::Candidate any =
-            core::trace<true, core::FusedBoxTest>(tree.view(), triangles, rays[i], nullptr);
+        const core::Candidate closest = core::trace<false, core::FusedBoxTest, core::Watertight>(
+            tree.view(), triangles, rays[i], &cost);
+        const core::Candidate any = core::trace<true, core::FusedBoxTest, core::Watertight>(
+            tree.view(), triangles, rays[i], nullptr);
         const Hit hit = core::to_hit(closest);
         ASSERT_TRUE(same_bits(hit, want[i]))
             << "seed " << seed << ", " << to_string(references) << ", ray " << i << " "
             << print(rays[i]) << ": " << print(hit) << " instead of " << print(want[i]);
         ASSERT_EQ(any.found(), test::is_hit(want[i])) << "any hit, ray " << print(rays[i]);
         node_visits += cost.node_visits;
-        (void)core::trace<false, core::BoxTest>(tree.view(), triangles, rays[i], &cost);
+        (void)core::trace<false, core::BoxTest, core::Watertight>(tree.view(), triangles, rays[i],
+                                                                  &cost);
         plain_node_visits += cost.node_visits;
       }
     }

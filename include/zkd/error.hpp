@@ -24,7 +24,8 @@ enum class ErrorCode {
   invalid_view,         ///< null pointer, odd stride or misaligned data; offender: see the message
   invalid_option,       ///< an option is outside its documented range; offender: its value, 0 for
                         ///< one that is no integer
-  unsupported_option,   ///< a valid option that this version does not build yet; offender: 0
+  unsupported_option,   ///< a valid option that this version, or the backend, does not have;
+                        ///< offender: 0
   backend_unavailable,  ///< the backend asked for is not linked, or no device answers; offender: 0
   out_of_memory,        ///< the memory resource refused; offender: the bytes asked for
   device_failure,       ///< a call to CUDA failed; offender: its cudaError_t

@@ -8,17 +8,14 @@
 //   t_min <= t <= t_max for the t that is returned.
 // - The nearest hit wins; of equally near ones, the triangle with the lowest index. Nearness is
 //   compared before t is rounded to the caller's units, which matters for far origins only.
-// - A ray that lies in a triangle's plane, up to rounding, does not hit it.
+// - A ray that lies in a triangle's plane, up to the rounding of the intersector, does not hit it.
 // - A degenerate ray (see Ray) misses at once.
-// - The intersector is watertight (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT
-//   2013): single precision, with an error bound, rejects; double precision decides what is left
-//   and gives t, u and v, rounded to float once. The signs of its edge functions are those of one
-//   set of sheared corners, exactly, so triangles that share an edge never both miss a ray through
-//   it.
 // - The tree never changes an answer: closest_hit equals a loop over all triangles with the same
 //   intersector, bit for bit.
 // - Answers do not depend on the caller's compiler flags or floating-point mode (rounding,
 //   flush-to-zero): the mode is set for the call and put back.
+//
+// How near an answer is to the exact one is said at Intersector, and proven in docs/accuracy.md.
 //
 // `triangles` must be the view the tree was built from (or a copy of its data at other addresses).
 // Nothing is allocated. The single-ray functions may be called from any number of threads.
@@ -35,14 +32,57 @@
 
 namespace zkd {
 
+/// How a ray is tested against a triangle: a choice of the query, of which the tree knows nothing.
+///
+/// In what follows, R is the largest distance along an axis from the ray's origin (of an origin far
+/// outside the scene: from the point of the ray next to the scene) to a corner of the triangle, and
+/// k = |d| |n| / |d . n| says how edge-on it is seen (d the direction, n the normal; 1: from the
+/// front). "Within e" means: hit and miss are those of exact arithmetic for a triangle whose
+/// corners are moved by e at most along each axis, one such triangle for all three edges.
+/// |t - exact t| |d| is bounded too, to which rounding t to a float adds half a unit in its last
+/// place.
+enum class Intersector : std::uint8_t {
+  /// Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013. Single precision
+  /// rejects, with an error bound; double precision decides what is left and gives t, u and v.
+  /// Within 6 * 2^-53 R; t to (9 k + 14) * 2^-53 R. The signs of its edge functions are those of
+  /// one set of sheared corners, exactly, so triangles that share an edge never both miss a ray
+  /// through it.
+  watertight,
+
+  /// Moeller, Trumbore, JGT 1997, in single precision. Rays may slip between triangles that share
+  /// an edge, and t is as good as single precision lets it be: the point found on the ray lies
+  /// within 26 * 2^-24 R of the triangle, else double precision decides.
+  fast,
+
+  /// Woop, Benthin, Wald in single precision, with Kahan's difference of products: for devices on
+  /// which double precision is slow. Watertight. Within 5 * 2^-24 R; t to (8 k + 15) * 2^-24 R,
+  /// for scenes in which no product of two distances is below 2^-100 of the square of the largest.
+  single_precision,
+
+  /// The answers of `watertight`, bit for bit, by double precision alone: what its filter is
+  /// checked
+  /// against.
+  double_precision,
+
+  /// No rounding: the triangle that is exactly hit first, of equally near ones the lowest index;
+  /// t, u and v are the exact ones, rounded once. t_min and t_max are compared with the exact t.
+  /// Long integers decide where double precision cannot. On the host only.
+  exact,
+};
+
+/// "watertight", "fast", "single", "double", "exact": the names used on command lines and in JSON.
+/// Static storage.
+ZKD_API const char* to_string(Intersector value) noexcept;
+
 /// The nearest hit along `ray`, or nothing. O(depth) for most rays, O(tree) at worst.
-[[nodiscard]] ZKD_API std::optional<Hit> closest_hit(const TreeView& tree,
-                                                     const TriangleView& triangles,
-                                                     const Ray& ray) noexcept;
+[[nodiscard]] ZKD_API std::optional<Hit> closest_hit(
+    const TreeView& tree, const TriangleView& triangles, const Ray& ray,
+    Intersector intersector = Intersector::watertight) noexcept;
 
 /// Whether anything is hit; true exactly when closest_hit finds something. Stops at the first hit.
 [[nodiscard]] ZKD_API bool any_hit(const TreeView& tree, const TriangleView& triangles,
-                                   const Ray& ray) noexcept;
+                                   const Ray& ray,
+                                   Intersector intersector = Intersector::watertight) noexcept;
 
 /// Work one ray caused. Counts may differ between backends and instruction sets, by rounding in
 /// box tests; answers do not.
@@ -58,19 +98,37 @@ struct TraversalCost {
 /// its length. Spans must not overlap.
 ZKD_API void closest_hit(const cpu::Executor& executor, const TreeView& tree,
                          const TriangleView& triangles, std::span<const Ray> rays,
-                         std::span<Hit> hits, std::span<TraversalCost> costs = {}) noexcept;
+                         std::span<Hit> hits, std::span<TraversalCost> costs = {},
+                         Intersector intersector = Intersector::watertight) noexcept;
 
 /// any_hit for each ray: occluded[i] is 1 if rays[i] hits anything, else 0. As above otherwise.
 ZKD_API void any_hit(const cpu::Executor& executor, const TreeView& tree,
                      const TriangleView& triangles, std::span<const Ray> rays,
-                     std::span<std::uint8_t> occluded,
-                     std::span<TraversalCost> costs = {}) noexcept;
+                     std::span<std::uint8_t> occluded, std::span<TraversalCost> costs = {},
+                     Intersector intersector = Intersector::watertight) noexcept;
 
 /// The same answers by a loop over all triangles: what the tree is checked against. Takes from
 /// `tree` its bounds and scale only, so that both prepare the ray in the same way. O(n) a ray.
 /// Triangles that a build would leave out (NaN, zero area) are never hit here either.
 ZKD_API void closest_hit_brute_force(const cpu::Executor& executor, const TreeView& tree,
                                      const TriangleView& triangles, std::span<const Ray> rays,
-                                     std::span<Hit> hits) noexcept;
+                                     std::span<Hit> hits,
+                                     Intersector intersector = Intersector::watertight) noexcept;
+
+/// Where a ray begins that leaves the surface at `hit` in `direction`: the point of the hit, moved
+/// off the plane of its triangle to the side that the direction goes to. A ray from there with that
+/// direction and t_min = 0 never hits the same triangle again (by the intersector given, which
+/// should be the one it will be traced with).
+///
+/// No coordinate moves by more than 2^-46 of the largest coordinate of the triangle (2^-15 for
+/// `fast` and `single_precision`), and on to the next float. That is proven to be enough
+/// (docs/accuracy.md) for directions no longer than 2^100 times that coordinate. The point may lie
+/// behind another triangle that meets this one: what belongs to both is decided by their order
+/// along the ray, not by a distance.
+///
+/// `hit` is one of `triangles`, not a miss. O(1); allocates nothing.
+[[nodiscard]] ZKD_API glm::vec3 offset_origin(
+    const TriangleView& triangles, const Hit& hit, const glm::vec3& direction,
+    Intersector intersector = Intersector::watertight) noexcept;
 
 }  // namespace zkd

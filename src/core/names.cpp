@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The names of options, stages and skips.
+// The names of options, intersectors, stages and skips.
 #include <zkd/options.hpp>
+#include <zkd/query.hpp>
 #include <zkd/statistics.hpp>
 
 #include <array>
@@ -35,6 +36,9 @@ const char* to_string(InvalidTriangles value) noexcept {
 }
 const char* to_string(AxisOrder value) noexcept {
   return name_of(std::array{"extent", "cyclic"}, value);
+}
+const char* to_string(Intersector value) noexcept {
+  return name_of(std::array{"watertight", "fast", "single", "double", "exact"}, value);
 }
 const char* to_string(Stage stage) noexcept {
   return name_of(std::array{"validate", "encode", "sort", "recode", "trunks", "essential_nodes",

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include <zkd/cuda/device.hpp>
+#include <zkd/error.hpp>
 
 #include "cuda/launch.cuh"
 
@@ -24,32 +25,39 @@ constexpr std::size_t most_rays = std::size_t{1} << 30;
 __device__ std::uint32_t thread_number() { return blockIdx.x * block_size + threadIdx.x; }
 
 // `costs` may be null.
+template <class Intersect>
 __global__ void __launch_bounds__(block_size)
     closest_hit_kernel(TreeView tree, TriangleView triangles, const Ray* rays, Hit* hits,
                        TraversalCost* costs, std::uint32_t count) {
   const std::uint32_t i = thread_number();
   if (i >= count) return;
   TraversalCost cost;
-  hits[i] = device::closest_hit(tree, triangles, rays[i], &cost);
+  hits[i] = core::to_hit(
+      core::trace<false, core::FusedBoxTest, Intersect>(tree, triangles, rays[i], &cost));
   if (costs != nullptr) costs[i] = cost;
 }
 
+template <class Intersect>
 __global__ void __launch_bounds__(block_size)
     any_hit_kernel(TreeView tree, TriangleView triangles, const Ray* rays, std::uint8_t* occluded,
                    TraversalCost* costs, std::uint32_t count) {
   const std::uint32_t i = thread_number();
   if (i >= count) return;
   TraversalCost cost;
-  occluded[i] = device::any_hit(tree, triangles, rays[i], &cost) ? 1 : 0;
+  const auto found =
+      core::trace<true, core::FusedBoxTest, Intersect>(tree, triangles, rays[i], &cost);
+  occluded[i] = found.found() ? 1 : 0;
   if (costs != nullptr) costs[i] = cost;
 }
 
 // All threads of a warp look at the same triangle at once.
+template <class Intersect>
 __global__ void __launch_bounds__(block_size)
     brute_force_kernel(TreeView tree, TriangleView triangles, const Ray* rays, Hit* hits,
                        std::uint32_t count) {
   const std::uint32_t i = thread_number();
-  if (i < count) hits[i] = core::to_hit(core::trace_brute_force(tree, triangles, rays[i]));
+  if (i < count)
+    hits[i] = core::to_hit(core::trace_brute_force<Intersect>(tree, triangles, rays[i]));
 }
 
 // kernel(arguments..., count) on the stream, a thread for each of `count` rays.
@@ -60,11 +68,19 @@ void trace(const char* what, cuda::Stream stream, std::uint32_t count, Kernel ke
                arguments..., count);
 }
 
-// work(first, count) for all of `total` rays, in as many launches as it takes.
+// work<type of the intersector>(first, count) for all of `total` rays, in as many launches as it
+// takes.
 template <class Work>
-void for_each_part(std::size_t total, Work work) {
-  for (std::size_t first = 0; first < total; first += most_rays)
-    work(first, static_cast<std::uint32_t>(std::min(most_rays, total - first)));
+void for_each_part(Intersector intersector, std::size_t total, Work work) {
+  if (intersector == Intersector::exact)
+    throw Error(ErrorCode::unsupported_option, 0,
+                "Intersector::exact is not available on CUDA devices: use it on the host, with a "
+                "tree brought there by to_host");
+  core::with_intersector(intersector, [=]<class Intersect>() {
+    for (std::size_t first = 0; first < total; first += most_rays)
+      work.template operator()<Intersect>(
+          first, static_cast<std::uint32_t>(std::min(most_rays, total - first)));
+  });
 }
 
 std::size_t ray_count(std::span<const Ray> rays, std::size_t answers,
@@ -81,30 +97,34 @@ TraversalCost* from(std::span<TraversalCost> costs, std::size_t first) {
 
 void closest_hit(const cuda::Executor& executor, const TreeView& tree,
                  const TriangleView& triangles, std::span<const Ray> rays, std::span<Hit> hits,
-                 std::span<TraversalCost> costs) {
-  for_each_part(ray_count(rays, hits.size(), costs), [&](std::size_t first, std::uint32_t count) {
-    trace("closest_hit", executor.stream, count, closest_hit_kernel, tree, triangles,
-          rays.data() + first, hits.data() + first, from(costs, first));
-  });
+                 std::span<TraversalCost> costs, Intersector intersector) {
+  for_each_part(intersector, ray_count(rays, hits.size(), costs),
+                [=, &executor]<class Intersect>(std::size_t first, std::uint32_t count) {
+                  trace("closest_hit", executor.stream, count, closest_hit_kernel<Intersect>, tree,
+                        triangles, rays.data() + first, hits.data() + first, from(costs, first));
+                });
 }
 
 void any_hit(const cuda::Executor& executor, const TreeView& tree, const TriangleView& triangles,
              std::span<const Ray> rays, std::span<std::uint8_t> occluded,
-             std::span<TraversalCost> costs) {
-  for_each_part(ray_count(rays, occluded.size(), costs),
-                [&](std::size_t first, std::uint32_t count) {
-                  trace("any_hit", executor.stream, count, any_hit_kernel, tree, triangles,
-                        rays.data() + first, occluded.data() + first, from(costs, first));
+             std::span<TraversalCost> costs, Intersector intersector) {
+  for_each_part(intersector, ray_count(rays, occluded.size(), costs),
+                [=, &executor]<class Intersect>(std::size_t first, std::uint32_t count) {
+                  trace("any_hit", executor.stream, count, any_hit_kernel<Intersect>, tree,
+                        triangles, rays.data() + first, occluded.data() + first,
+                        from(costs, first));
                 });
 }
 
 void closest_hit_brute_force(const cuda::Executor& executor, const TreeView& tree,
                              const TriangleView& triangles, std::span<const Ray> rays,
-                             std::span<Hit> hits) {
-  for_each_part(ray_count(rays, hits.size(), {}), [&](std::size_t first, std::uint32_t count) {
-    trace("closest_hit_brute_force", executor.stream, count, brute_force_kernel, tree, triangles,
-          rays.data() + first, hits.data() + first);
-  });
+                             std::span<Hit> hits, Intersector intersector) {
+  for_each_part(intersector, ray_count(rays, hits.size(), {}),
+                [=, &executor]<class Intersect>(std::size_t first, std::uint32_t count) {
+                  trace("closest_hit_brute_force", executor.stream, count,
+                        brute_force_kernel<Intersect>, tree, triangles, rays.data() + first,
+                        hits.data() + first);
+                });
 }
 
 }  // namespace zkd

@@ -37,6 +37,9 @@ inline const char* name(Walk walk) {
   return walk == Walk::portable ? "portable" : walk == Walk::avx2 ? "avx2" : "automatic";
 }
 
+/// The ways to test a triangle that this platform has.
+std::vector<Intersector> intersectors();
+
 /// A tree in the memory of the platform, its triangles there as well.
 class PlatformTree {
  public:
@@ -52,13 +55,16 @@ class PlatformTree {
   [[nodiscard]] const Tree& host() const;
 
   /// Traced there, in the memory that the tree is in. Rays and answers are in host memory.
-  [[nodiscard]] std::vector<Hit> closest_hits(std::span<const Ray> rays,
-                                              Walk walk = Walk::automatic,
-                                              std::vector<TraversalCost>* costs = nullptr) const;
-  [[nodiscard]] std::vector<std::uint8_t> any_hits(std::span<const Ray> rays,
-                                                   Walk walk = Walk::automatic) const;
-  [[nodiscard]] std::vector<Hit> brute_force_hits(std::span<const Ray> rays,
-                                                  Walk walk = Walk::automatic) const;
+  [[nodiscard]] std::vector<Hit> closest_hits(
+      std::span<const Ray> rays, Walk walk = Walk::automatic,
+      std::vector<TraversalCost>* costs = nullptr,
+      Intersector intersector = Intersector::watertight) const;
+  [[nodiscard]] std::vector<std::uint8_t> any_hits(
+      std::span<const Ray> rays, Walk walk = Walk::automatic,
+      Intersector intersector = Intersector::watertight) const;
+  [[nodiscard]] std::vector<Hit> brute_force_hits(
+      std::span<const Ray> rays, Walk walk = Walk::automatic,
+      Intersector intersector = Intersector::watertight) const;
 
  private:
   struct There;

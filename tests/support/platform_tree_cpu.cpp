@@ -29,6 +29,11 @@ std::uint32_t build_thinning() { return 1; }
 
 std::vector<Walk> walks() { return {Walk::portable, Walk::avx2}; }
 
+std::vector<Intersector> intersectors() {
+  return {Intersector::watertight, Intersector::fast, Intersector::single_precision,
+          Intersector::double_precision, Intersector::exact};
+}
+
 struct PlatformTree::There {
   Tree tree;
   TriangleView triangles;
@@ -44,26 +49,30 @@ PlatformTree::~PlatformTree() = default;
 const Tree& PlatformTree::host() const { return there_->tree; }
 
 std::vector<Hit> PlatformTree::closest_hits(std::span<const Ray> rays, Walk walk,
-                                            std::vector<TraversalCost>* costs) const {
+                                            std::vector<TraversalCost>* costs,
+                                            Intersector intersector) const {
   std::vector<Hit> hits(rays.size());
   std::span<TraversalCost> to;
   if (costs != nullptr) {
     costs->resize(rays.size());
     to = *costs;
   }
-  closest_hit(executor(walk), there_->tree.view(), there_->triangles, rays, hits, to);
+  closest_hit(executor(walk), there_->tree.view(), there_->triangles, rays, hits, to, intersector);
   return hits;
 }
 
-std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk walk) const {
+std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk walk,
+                                                 Intersector intersector) const {
   std::vector<std::uint8_t> occluded(rays.size(), 7);
-  any_hit(executor(walk), there_->tree.view(), there_->triangles, rays, occluded);
+  any_hit(executor(walk), there_->tree.view(), there_->triangles, rays, occluded, {}, intersector);
   return occluded;
 }
 
-std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk walk) const {
+std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk walk,
+                                                Intersector intersector) const {
   std::vector<Hit> hits(rays.size());
-  closest_hit_brute_force(executor(walk), there_->tree.view(), there_->triangles, rays, hits);
+  closest_hit_brute_force(executor(walk), there_->tree.view(), there_->triangles, rays, hits,
+                          intersector);
   return hits;
 }
 

@@ -21,6 +21,11 @@ std::uint32_t build_thinning() { return 1; }
 
 std::vector<Walk> walks() { return {Walk::automatic}; }
 
+std::vector<Intersector> intersectors() {
+  return {Intersector::watertight, Intersector::fast, Intersector::single_precision,
+          Intersector::double_precision};
+}
+
 struct PlatformTree::There {
   UploadedTriangles<Array> triangles;
   cuda::Tree tree;
@@ -42,27 +47,32 @@ PlatformTree::~PlatformTree() = default;
 const Tree& PlatformTree::host() const { return there_->on_host; }
 
 std::vector<Hit> PlatformTree::closest_hits(std::span<const Ray> rays, Walk,
-                                            std::vector<TraversalCost>* costs) const {
+                                            std::vector<TraversalCost>* costs,
+                                            Intersector intersector) const {
   const Array<Ray> uploaded(rays);
   Array<Hit> hits(rays.size());
   Array<TraversalCost> visits(costs != nullptr ? rays.size() : 0);
-  closest_hit(executor(), there_->tree.view(), there_->tree.triangles(), uploaded, hits, visits);
+  closest_hit(executor(), there_->tree.view(), there_->tree.triangles(), uploaded, hits, visits,
+              intersector);
   if (costs != nullptr) *costs = visits.download();
   return hits.download();
 }
 
-std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk) const {
+std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk,
+                                                 Intersector intersector) const {
   const Array<Ray> uploaded(rays);
   Array<std::uint8_t> occluded(rays.size(), 7);
-  any_hit(executor(), there_->tree.view(), there_->tree.triangles(), uploaded, occluded);
+  any_hit(executor(), there_->tree.view(), there_->tree.triangles(), uploaded, occluded, {},
+          intersector);
   return occluded.download();
 }
 
-std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk) const {
+std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk,
+                                                Intersector intersector) const {
   const Array<Ray> uploaded(rays);
   Array<Hit> hits(rays.size());
-  closest_hit_brute_force(executor(), there_->tree.view(), there_->tree.triangles(), uploaded,
-                          hits);
+  closest_hit_brute_force(executor(), there_->tree.view(), there_->tree.triangles(), uploaded, hits,
+                          intersector);
   return hits.download();
 }
 

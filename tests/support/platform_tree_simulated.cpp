@@ -42,6 +42,11 @@ std::uint32_t build_thinning() { return 17; }
 
 std::vector<Walk> walks() { return {Walk::automatic}; }
 
+std::vector<Intersector> intersectors() {
+  return {Intersector::watertight, Intersector::fast, Intersector::single_precision,
+          Intersector::double_precision};
+}
+
 struct PlatformTree::There {
   UploadedTriangles<simulated::Array> triangles;
   simulated::Tree tree;
@@ -64,35 +69,49 @@ PlatformTree::~PlatformTree() = default;
 const Tree& PlatformTree::host() const { return there_->on_host; }
 
 std::vector<Hit> PlatformTree::closest_hits(std::span<const Ray> rays, Walk,
-                                            std::vector<TraversalCost>* costs) const {
+                                            std::vector<TraversalCost>* costs,
+                                            Intersector intersector) const {
   const Array<Ray> uploaded(rays);
   Array<Hit> hits(rays.size());
   Array<TraversalCost> visits(rays.size());
-  trace(uploaded, [tree = there_->tree.view(), triangles = there_->tree.triangles(),
-                   out = std::span<Hit>(hits).data(),
-                   cost = std::span<TraversalCost>(visits).data()](const Ray& ray, std::size_t i) {
-    out[i] = core::to_hit(core::trace<false, core::FusedBoxTest>(tree, triangles, ray, &cost[i]));
+  core::with_intersector(intersector, [&]<class Intersect>() {
+    trace(uploaded,
+          [tree = there_->tree.view(), triangles = there_->tree.triangles(),
+           out = std::span<Hit>(hits).data(),
+           cost = std::span<TraversalCost>(visits).data()](const Ray& ray, std::size_t i) {
+            out[i] = core::to_hit(
+                core::trace<false, core::FusedBoxTest, Intersect>(tree, triangles, ray, &cost[i]));
+          });
   });
   if (costs != nullptr) *costs = visits.download();
   return hits.download();
 }
 
-std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk) const {
+std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk,
+                                                 Intersector intersector) const {
   const Array<Ray> uploaded(rays);
   Array<std::uint8_t> occluded(rays.size(), 7);
-  trace(uploaded, [tree = there_->tree.view(), triangles = there_->tree.triangles(),
-                   out = std::span<std::uint8_t>(occluded).data()](const Ray& ray, std::size_t i) {
-    out[i] = core::trace<true, core::FusedBoxTest>(tree, triangles, ray, nullptr).found() ? 1 : 0;
+  core::with_intersector(intersector, [&]<class Intersect>() {
+    trace(uploaded,
+          [tree = there_->tree.view(), triangles = there_->tree.triangles(),
+           out = std::span<std::uint8_t>(occluded).data()](const Ray& ray, std::size_t i) {
+            const auto found =
+                core::trace<true, core::FusedBoxTest, Intersect>(tree, triangles, ray, nullptr);
+            out[i] = found.found() ? 1 : 0;
+          });
   });
   return occluded.download();
 }
 
-std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk) const {
+std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk,
+                                                Intersector intersector) const {
   const Array<Ray> uploaded(rays);
   Array<Hit> hits(rays.size());
-  trace(uploaded, [tree = there_->tree.view(), triangles = there_->tree.triangles(),
-                   out = std::span<Hit>(hits).data()](const Ray& ray, std::size_t i) {
-    out[i] = core::to_hit(core::trace_brute_force(tree, triangles, ray));
+  core::with_intersector(intersector, [&]<class Intersect>() {
+    trace(uploaded, [tree = there_->tree.view(), triangles = there_->tree.triangles(),
+                     out = std::span<Hit>(hits).data()](const Ray& ray, std::size_t i) {
+      out[i] = core::to_hit(core::trace_brute_force<Intersect>(tree, triangles, ray));
+    });
   });
   return hits.download();
 }

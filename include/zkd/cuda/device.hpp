@@ -36,6 +36,8 @@
 #include <zkd/config.hpp>
 #include <zkd/geometry.hpp>
 #include <zkd/query.hpp>
+#include <zkd/traversal/intersectors.hpp>
+#include <zkd/traversal/offset.hpp>
 #include <zkd/traversal/traverse.hpp>
 #include <zkd/tree.hpp>
 
@@ -100,16 +102,32 @@ class FusedBoxTest {
 namespace zkd::device {
 
 /// The nearest hit along `ray`; a miss has triangle == no_triangle, t == infinity, u == v == 0. The
-/// rules are those of zkd/query.hpp. `cost`, unless null, is overwritten.
+/// rules are those of zkd/query.hpp. `cost`, unless null, is overwritten. Any intersector but
+/// `exact`: closest_hit<Intersector::fast>(...).
+template <Intersector intersector = Intersector::watertight>
 [[nodiscard]] __device__ inline Hit closest_hit(const TreeView& tree, const TriangleView& triangles,
                                                 const Ray& ray, TraversalCost* cost = nullptr) {
-  return core::to_hit(core::trace<false, core::FusedBoxTest>(tree, triangles, ray, cost));
+  using Intersect = typename core::Named<intersector>::type;
+  return core::to_hit(
+      core::trace<false, core::FusedBoxTest, Intersect>(tree, triangles, ray, cost));
 }
 
 /// Whether anything is hit; true exactly when closest_hit finds something. Stops at the first hit.
+template <Intersector intersector = Intersector::watertight>
 [[nodiscard]] __device__ inline bool any_hit(const TreeView& tree, const TriangleView& triangles,
                                              const Ray& ray, TraversalCost* cost = nullptr) {
-  return core::trace<true, core::FusedBoxTest>(tree, triangles, ray, cost).found();
+  using Intersect = typename core::Named<intersector>::type;
+  return core::trace<true, core::FusedBoxTest, Intersect>(tree, triangles, ray, cost).found();
+}
+
+/// Where a ray begins that leaves the surface at `hit`: see zkd/query.hpp.
+template <Intersector intersector = Intersector::watertight>
+[[nodiscard]] __device__ inline glm::vec3 offset_origin(const TriangleView& triangles,
+                                                        const Hit& hit,
+                                                        const glm::vec3& direction) {
+  using Intersect = typename core::Named<intersector>::type;
+  return core::offset_origin(core::corners_of(triangles, hit.triangle), hit.u, hit.v, direction,
+                             Intersect::plane_margin);
 }
 
 }  // namespace zkd::device

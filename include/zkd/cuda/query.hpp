@@ -22,20 +22,24 @@ namespace zkd {
 ///
 /// `hits` (and `costs`, unless empty) should be as long as `rays`; a shorter one ends the work at
 /// its length. Spans must not overlap. A thread traces one ray, so neighbouring rays should be
-/// alike. Throws Error backend_unavailable, device_failure for what is known at the call; what
+/// alike. Throws Error unsupported_option (Intersector::exact, which only the host has),
+/// backend_unavailable, device_failure for what is known at the call; what
 /// fails on the device comes up where the stream is waited for.
 ZKD_API void closest_hit(const cuda::Executor& executor, const TreeView& tree,
                          const TriangleView& triangles, std::span<const Ray> rays,
-                         std::span<Hit> hits, std::span<TraversalCost> costs = {});
+                         std::span<Hit> hits, std::span<TraversalCost> costs = {},
+                         Intersector intersector = Intersector::watertight);
 
 /// any_hit for each ray: occluded[i] is 1 if rays[i] hits anything, else 0. As above otherwise.
 ZKD_API void any_hit(const cuda::Executor& executor, const TreeView& tree,
                      const TriangleView& triangles, std::span<const Ray> rays,
-                     std::span<std::uint8_t> occluded, std::span<TraversalCost> costs = {});
+                     std::span<std::uint8_t> occluded, std::span<TraversalCost> costs = {},
+                     Intersector intersector = Intersector::watertight);
 
 /// The same answers by a loop over all triangles; see zkd/query.hpp. As above otherwise.
 ZKD_API void closest_hit_brute_force(const cuda::Executor& executor, const TreeView& tree,
                                      const TriangleView& triangles, std::span<const Ray> rays,
-                                     std::span<Hit> hits);
+                                     std::span<Hit> hits,
+                                     Intersector intersector = Intersector::watertight);
 
 }  // namespace zkd

@@ -137,6 +137,14 @@ ZKD_HOST_DEVICE inline std::uint32_t bits_of(float x) {
 #endif
 }
 
+ZKD_HOST_DEVICE inline float float_of(std::uint32_t bits) {
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(bits);
+#else
+  return std::bit_cast<float>(bits);
+#endif
+}
+
 ZKD_HOST_DEVICE inline bool is_finite(float x) { return (bits_of(x) & 0x7F800000u) != 0x7F800000u; }
 
 /// of[i], i a variable. By comparisons where the array should stay in registers: on the device one

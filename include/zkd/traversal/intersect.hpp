@@ -8,7 +8,8 @@
 // whether the ray passes inside. Where two of them differ in sign by more than an error bound, the
 // corners sheared in double differ as well; else those are looked at, by Kahan's difference of
 // products, whose sign is exact. So all signs belong to one set of points, and two triangles that
-// share an edge never both miss a ray through it. For device code and the library: see
+// share an edge never both miss a ray through it. Every constant here is derived in
+// docs/accuracy.md, from which the names of sections are. For device code and the library: see
 // arithmetic.hpp.
 #pragma once
 
@@ -16,28 +17,49 @@
 
 #include <zkd/geometry.hpp>
 #include <zkd/traversal/arithmetic.hpp>
+#include <zkd/traversal/candidate.hpp>
 #include <zkd/traversal/ray.hpp>
 #include <zkd/traversal/triangle.hpp>
 
 namespace zkd::core {
 
-/// A hit in tree space. Nearer is a smaller t; of equal ones, the lower id.
-struct Candidate {
-  Wide t = 3.4028234663852886e38;  ///< no hit in tree space is further
-  Real limit =
-      3.4028234663852886e38F;  ///< not less than t: a box that begins behind it is of no use
-  float callers_t = 0.0F;
-  float u = 0.0F;
-  float v = 0.0F;
-  std::uint32_t triangle = no_triangle;
+/// Whether two of three edge functions are of opposite signs: the ray's line passes outside.
+template <class T>
+ZKD_HOST_DEVICE inline bool opposite(const Rounded<T> (&w)[3]) {
+  const Rounded<T> zero = T(0);
+  return (w[0] < zero || w[1] < zero || w[2] < zero) && (w[0] > zero || w[1] > zero || w[2] > zero);
+}
 
-  [[nodiscard]] ZKD_HOST_DEVICE bool found() const { return triangle != no_triangle; }
+/// Corners of a triangle relative to a ray, sheared so that the ray runs along z.
+template <class T>
+struct Sheared {
+  Rounded<T> x[3];
+  Rounded<T> y[3];
+  Rounded<T> depth[3];
+
+  /// The edge functions, by corner opposite: weights of the corners where the ray passes. Their
+  /// signs are exact for these x and y, short of underflow.
+  ZKD_HOST_DEVICE void weights(Rounded<T> (&w)[3]) const {
+    w[0] = difference_of_products(x[2], y[1], y[2], x[1]);
+    w[1] = difference_of_products(x[0], y[2], y[0], x[2]);
+    w[2] = difference_of_products(x[1], y[0], y[1], x[0]);
+  }
+
+  /// Where the line passes, from weights no two of which are opposite, and their sum.
+  /// `inverse_depth`: 1 / direction[kz].
+  [[nodiscard]] ZKD_HOST_DEVICE Crossing at(const Rounded<T> (&w)[3], Rounded<T> sum,
+                                            Rounded<T> inverse_depth) const {
+    const Rounded<T> t =
+        (w[0] * depth[0] + w[1] * depth[1] + w[2] * depth[2]) * inverse_depth / sum;
+    return {static_cast<double>(t.value), static_cast<double>((w[1] / sum).value),
+            static_cast<double>((w[2] / sum).value)};
+  }
 };
 
-/// Whether the ray's line passes outside the triangle for certain, by single precision.
+/// Whether the ray's line passes outside the triangle for certain, by single precision ("The
+/// filter").
 ZKD_HOST_DEVICE inline bool surely_misses(const PreparedRay& ray, const Corners& corners) {
-  Real x[3];
-  Real y[3];
+  Sheared<float> sheared;
   Real size_x = 0.0F;
   Real size_y = 0.0F;
   Real across_x = 0.0F;
@@ -46,82 +68,90 @@ ZKD_HOST_DEVICE inline bool surely_misses(const PreparedRay& ray, const Corners&
     const Real along = ray.from_origin(corners.p[i], 2);
     const Real right = ray.from_origin(corners.p[i], 0);
     const Real up = ray.from_origin(corners.p[i], 1);
-    x[i] = fma(-ray.shear[0], along, right);
-    y[i] = fma(-ray.shear[1], along, up);
+    sheared.x[i] = fma(-ray.shear[0], along, right);
+    sheared.y[i] = fma(-ray.shear[1], along, up);
     size_x = larger(size_x, magnitude(right) + magnitude(along));
     size_y = larger(size_y, magnitude(up) + magnitude(along));
-    across_x = larger(across_x, magnitude(x[i]));
-    across_y = larger(across_y, magnitude(y[i]));
+    across_x = larger(across_x, magnitude(sheared.x[i]));
+    across_y = larger(across_y, magnitude(sheared.y[i]));
   }
-  const Real a = difference_of_products(x[2], y[1], y[2], x[1]);
-  const Real b = difference_of_products(x[0], y[2], y[0], x[2]);
-  const Real c = difference_of_products(x[1], y[0], y[1], x[0]);
+  Real w[3];
+  sheared.weights(w);
 
-  // Subtraction, the slope and the shear round a sheared coordinate by 3 * 2^-24 of its size at
-  // most (5 for a moved origin); 6 leaves room for the products and for the bound's own rounding.
-  // Below 2^-96 edge functions lose digits to underflow.
+  // A sheared coordinate is off by 3 units of its size (5 for a moved origin); 6 leaves room for
+  // the products and for the bound's own rounding. Below 2^-96 edge functions lose digits to
+  // underflow.
   constexpr float unit = 1.0F / 16777216.0F;
   constexpr float smallest = 1.2621774e-29F;
   const Real error_x = Real(6.0F * unit) * size_x;
   const Real error_y = Real(6.0F * unit) * size_y;
   const Real bound =
       larger(Real(2.0F) * (error_x * (across_y + error_y) + error_y * across_x), Real(smallest));
-  const Real least = smaller(a, smaller(b, c));
-  const Real most = larger(a, larger(b, c));
+  const Real least = smaller(w[0], smaller(w[1], w[2]));
+  const Real most = larger(w[0], larger(w[1], w[2]));
   return least < -bound && most > bound;
 }
 
-/// Where a ray's line meets a triangle: t in tree space, and u, v as in Hit.
-struct Crossing {
-  Wide t;
-  Wide u;
-  Wide v;
-};
-
-/// Whether the ray's line passes inside the triangle, and where.
+/// Whether the ray's line passes inside the triangle, and where, by double precision.
 ZKD_HOST_DEVICE inline bool crosses(const PreparedRay& ray, const Corners& corners,
                                     Crossing& crossing) {
-  Wide x[3];
-  Wide y[3];
-  Wide depth[3];
+  Sheared<double> sheared;
   for (int i = 0; i < 3; ++i) {
-    depth[i] = ray.wide_from_origin(corners.p[i], 2);
-    x[i] = ray.wide_from_origin(corners.p[i], 0) - ray.wide_shear[0] * depth[i];
-    y[i] = ray.wide_from_origin(corners.p[i], 1) - ray.wide_shear[1] * depth[i];
+    sheared.depth[i] = ray.wide_from_origin(corners.p[i], 2);
+    sheared.x[i] = ray.wide_from_origin(corners.p[i], 0) - ray.wide_shear[0] * sheared.depth[i];
+    sheared.y[i] = ray.wide_from_origin(corners.p[i], 1) - ray.wide_shear[1] * sheared.depth[i];
   }
-  const Wide a = difference_of_products(x[2], y[1], y[2], x[1]);
-  const Wide b = difference_of_products(x[0], y[2], y[0], x[2]);
-  const Wide c = difference_of_products(x[1], y[0], y[1], x[0]);
-  const Wide zero = 0.0;
-  if ((a < zero || b < zero || c < zero) && (a > zero || b > zero || c > zero)) return false;
-  const Wide determinant = a + b + c;
-  if (!(determinant < zero) && !(determinant > zero)) return false;
-  crossing = {(a * depth[0] + b * depth[1] + c * depth[2]) * ray.wide_shear[2] / determinant,
-              b / determinant, c / determinant};
+  Wide w[3];
+  sheared.weights(w);
+  if (opposite(w)) return false;
+  const Wide sum = w[0] + w[1] + w[2];
+  if (!(magnitude(sum) > Wide(0.0))) return false;
+  crossing = sheared.at(w, sum, ray.wide_shear[2]);
   return true;
 }
 
-/// Replaces `best` by the hit on this triangle, if there is one in the ray's interval and nearer.
-/// Returns whether it did.
-ZKD_HOST_DEVICE inline bool intersect(const PreparedRay& ray, const Corners& corners,
-                                      std::uint32_t id, Candidate& best) {
-  if (surely_misses(ray, corners)) return false;
-  Crossing crossing;
-  if (!crosses(ray, corners, crossing)) return false;
-  // Written so that NaN, from coordinates that are not finite, is never accepted.
-  if (!(crossing.t <= best.t)) return false;
-  if (crossing.t == best.t && !(id < best.triangle)) return false;
-  const float callers_t = ray.callers_t(crossing.t);
-  if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
+// An intersector is a type that is made from a prepared ray and the caller's, and called with the
+// corners and the id of a triangle and the best candidate so far, which it replaces by a nearer
+// one. `slab_units` is the half-width that boxes need so that no hit of its is lost: 4 units for
+// the test of the box, and how far from the triangle a hit may lie ("Boxes"), in units of 2^-24 of
+// the reach of the scene from the ray's origin. `plane_margin` is how far off a triangle's plane,
+// in units of its largest coordinate, a ray begins that will not hit it ("Spawned rays").
 
-  constexpr float slack = 1.0F / 4194304.0F;  // 2^-22, more than rounding t to float takes
-  const Real t = static_cast<float>(crossing.t.value);
-  const Real limit = t + Real(slack) * magnitude(t) + Real(1.0e-37F);
-  const Real zero = 0.0F;  // adding +0 turns -0 into +0
-  const Real u = Real(static_cast<float>(crossing.u.value)) + zero;
-  const Real v = Real(static_cast<float>(crossing.v.value)) + zero;
-  best = {crossing.t, limit, callers_t, u.value, v.value, id};
-  return true;
-}
+/// Intersector::watertight.
+class Watertight {
+ public:
+  using Candidate = core::Candidate;
+  static constexpr float slab_units = 5.0F;
+  static constexpr double plane_margin = 0x1p-46;
+
+  ZKD_HOST_DEVICE Watertight(const PreparedRay& ray, const Ray&) : ray_(ray) {}
+
+  ZKD_HOST_DEVICE bool operator()(const Corners& corners, std::uint32_t id, Candidate& best) const {
+    Crossing crossing;
+    return !surely_misses(ray_, corners) && crosses(ray_, corners, crossing) &&
+           accept(ray_, crossing, id, best);
+  }
+
+ private:
+  const PreparedRay& ray_;
+};
+
+/// Intersector::double_precision: what Watertight answers, without its filter.
+class DoublePrecision {
+ public:
+  using Candidate = core::Candidate;
+  static constexpr float slab_units = Watertight::slab_units;
+  static constexpr double plane_margin = Watertight::plane_margin;
+
+  ZKD_HOST_DEVICE DoublePrecision(const PreparedRay& ray, const Ray&) : ray_(ray) {}
+
+  ZKD_HOST_DEVICE bool operator()(const Corners& corners, std::uint32_t id, Candidate& best) const {
+    Crossing crossing;
+    return crosses(ray_, corners, crossing) && accept(ray_, crossing, id, best);
+  }
+
+ private:
+  const PreparedRay& ray_;
+};
 
 }  // namespace zkd::core

@@ -13,12 +13,6 @@
 
 namespace zkd::core {
 
-/// Half-width of every box in traversal, in units of 2^-24 of the largest distance along an axis
-/// between the ray's origin and the scene box. The box test rounds a difference, an inverse, a
-/// product and a sum, each by 1 unit at most, since no box reaches further than the scene; hits are
-/// computed in double. 8 is twice the sum.
-inline constexpr float slab_units = 8.0F;
-
 /// An origin further from the scene box than this many times the largest coordinate is moved along
 /// the ray, in double, to the point nearest to the scene's centre.
 inline constexpr double far_origin = 8.0;
@@ -28,11 +22,12 @@ struct PreparedRay {
   Real origin[3];
   Real inverse[3];          ///< of the direction; large instead of infinite
   Real padding[3];          ///< half-width of a plane, in units of t
-  Real shear[2];            ///< direction[kx] / direction[kz], [ky] / [kz]
+  Real reach;               ///< largest distance along an axis from the origin to the scene box
+  Real shear[3];            ///< direction[kx] / direction[kz], [ky] / [kz]; 1 / direction[kz]
   Real permuted_origin[3];  ///< origin in the order kx, ky, kz
   Real permuted_rest[3];    ///< what rounding a moved origin to float took off it
   Wide wide_origin[3];      ///< the same in double, and not rounded
-  Wide wide_shear[3];       ///< shear likewise, and 1 / direction[kz]
+  Wide wide_shear[3];       ///< shear likewise
   bool moved = false;
   std::uint32_t k[3];
   std::uint32_t negative_axes = 0;  ///< bit a: the direction is negative along axis a
@@ -47,7 +42,9 @@ struct PreparedRay {
   Real scale;
   bool valid = false;
 
-  ZKD_HOST_DEVICE PreparedRay(const TreeView& tree, const Ray& ray)
+  /// `slab_units`: half-width of every box, in units of 2^-24 of the reach ("Boxes" in
+  /// docs/accuracy.md).
+  ZKD_HOST_DEVICE PreparedRay(const TreeView& tree, const Ray& ray, float slab_units)
       : t_min(ray.t_min), t_max(ray.t_max), scale(tree.scale()) {
     const float origin_in[3] = {ray.origin.x, ray.origin.y, ray.origin.z};
     const float direction_in[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
@@ -85,7 +82,7 @@ struct PreparedRay {
         !approach(low, high, direction, from, coordinate))
       return;
 
-    Real reach = 0.0F;
+    reach = 0.0F;
     Real furthest = 0.0F;
     for (int a = 0; a < 3; ++a) {
       origin[a] = static_cast<float>(from[a].value);
@@ -97,7 +94,7 @@ struct PreparedRay {
     constexpr float unit = 1.0F / 16777216.0F;
     // Boxes are tested from a moved origin that was rounded to float, the intersector's is not.
     const Real rounding = moved ? Real(2.0F * unit) * furthest : Real(0.0F);
-    const Real half_width = Real(slab_units * unit) * reach + rounding;
+    const Real half_width = Real(slab_units) * Real(unit) * reach + rounding;
 
     Real d[3];
     for (int a = 0; a < 3; ++a) {
@@ -120,8 +117,8 @@ struct PreparedRay {
     wide_shear[0] = element(direction, k[0]) / longest_component;
     wide_shear[1] = element(direction, k[1]) / longest_component;
     wide_shear[2] = Wide(1.0) / longest_component;
-    for (int i = 0; i < 2; ++i) shear[i] = static_cast<float>(wide_shear[i].value);
     for (int i = 0; i < 3; ++i) {
+      shear[i] = static_cast<float>(wide_shear[i].value);
       permuted_origin[i] = element(origin, k[i]);
       wide_origin[i] = element(from, k[i]);
       const Wide rounded = static_cast<double>(permuted_origin[i].value);
@@ -144,6 +141,11 @@ struct PreparedRay {
     return moved ? difference - permuted_rest[i] : difference;
   }
 
+  /// Component k[i] of the way from one corner to another, in tree space.
+  [[nodiscard]] ZKD_HOST_DEVICE Real along_edge(const float* from, const float* to, int i) const {
+    return Real(to[k[i]]) * scale - Real(from[k[i]]) * scale;
+  }
+
   [[nodiscard]] ZKD_HOST_DEVICE Wide wide_from_origin(const float* corner, int i) const {
     return Wide(static_cast<double>(corner[k[i]])) * Wide(static_cast<double>(scale.value)) -
            wide_origin[i];
@@ -157,22 +159,45 @@ struct PreparedRay {
  private:
   /// Moves `from` along the ray to the point nearest to the scene's centre. False: that point is so
   /// far out that the ray passes the scene.
+  ///
+  /// An origin may be further away than a double can tell two points of the scene apart: `from` is
+  /// moved without losing a digit, as a sum of two doubles, and moved again while t_shift, rounded,
+  /// leaves it far from the scene.
   ZKD_HOST_DEVICE bool approach(const Wide (&low)[3], const Wide (&high)[3],
                                 const Wide (&direction)[3], Wide (&from)[3], Wide coordinate) {
-    Wide projected = 0.0;
-    Wide squared = 0.0;
-    for (int a = 0; a < 3; ++a) {
-      const Wide to_centre = (low[a] + high[a]) * Wide(0.5) - from[a];
-      projected = projected + to_centre * direction[a];
-      squared = squared + direction[a] * direction[a];
-    }
     moved = true;
-    t_shift = projected / squared;
-    for (int a = 0; a < 3; ++a) {
-      from[a] = from[a] + t_shift * direction[a];
-      if (!(magnitude(from[a]) <= Wide(16.0) * coordinate)) return false;
+    Wide squared = 0.0;
+    for (int a = 0; a < 3; ++a) squared = squared + direction[a] * direction[a];
+    Wide rest[3] = {0.0, 0.0, 0.0};
+    for (;;) {
+      Wide projected = 0.0;
+      for (int a = 0; a < 3; ++a)
+        projected = projected + ((low[a] + high[a]) * Wide(0.5) - from[a]) * direction[a];
+      const Wide shift = projected / squared;
+      t_shift = t_shift + shift;
+      Wide furthest = 0.0;
+      for (int a = 0; a < 3; ++a) {
+        move(from[a], rest[a], shift, direction[a]);
+        furthest = larger(furthest, magnitude(from[a]));
+      }
+      if (furthest <= Wide(16.0) * coordinate) return true;
+      // What is left of the way along the ray is lost in the rounding of t_shift: another step is
+      // of use while this one was the longer by far.
+      if (!(magnitude(shift) > Wide(1024.0) * furthest)) return false;
     }
-    return true;
+  }
+
+  /// (from + rest) + shift * along, by sums and products without error (Dekker 1971; Knuth),
+  /// rounded to the two doubles.
+  static ZKD_HOST_DEVICE void move(Wide& from, Wide& rest, Wide shift, Wide along) {
+    const Wide product = shift * along;
+    const Wide product_rest = fma(shift, along, -product);
+    const Wide sum = from + product;
+    const Wide added = sum - from;
+    const Wide sum_rest = (from - (sum - added)) + (product - added);
+    const Wide small = (rest + product_rest) + sum_rest;
+    from = sum + small;
+    rest = small - (from - sum);
   }
 
   /// An end of the interval in tree space, moved outward by more than the rounding of t.

@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include <zkd/query.hpp>
+#include <zkd/traversal/candidate.hpp>
 #include <zkd/traversal/intersect.hpp>
 #include <zkd/traversal/ray.hpp>
 #include <zkd/traversal/triangle.hpp>
@@ -56,9 +57,12 @@ class BoxTest {
 };
 
 /// Walks the tree. With `any`, stops at the first hit.
-template <bool any, class Boxes>
-ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleView& triangles,
-                                          const PreparedRay& ray, TraversalCost* cost) {
+template <bool any, class Boxes, class Intersect>
+ZKD_HOST_DEVICE inline typename Intersect::Candidate traverse(const TreeView& tree,
+                                                              const TriangleView& triangles,
+                                                              const PreparedRay& ray,
+                                                              const Intersect& intersect,
+                                                              TraversalCost* cost) {
   const Boxes boxes(ray);
   struct alignas(8) Waiting {  // without initialisers: a stack of them costs nothing
     std::uint32_t link;
@@ -66,7 +70,7 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
   };
   Waiting stack[max_depth];
   std::uint32_t waiting = 0;
-  Candidate best;
+  typename Intersect::Candidate best;
   Link link = tree.root();
   std::uint32_t node_visits = 0;
   std::uint32_t triangle_tests = 0;
@@ -96,7 +100,7 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
       for (std::uint32_t r = tree.leaf_offsets[link.index()]; r < end; ++r) {
         const std::uint32_t id = tree.references[r];
         ++triangle_tests;
-        if (intersect(ray, corners_of(triangles, id), id, best) && any) {
+        if (intersect(corners_of(triangles, id), id, best) && any) {
           waiting = 0;
           break;
         }
@@ -114,33 +118,34 @@ ZKD_HOST_DEVICE inline Candidate traverse(const TreeView& tree, const TriangleVi
   }
 }
 
-template <bool any, class Boxes = BoxTest>
-ZKD_HOST_DEVICE inline Candidate trace(const TreeView& tree, const TriangleView& triangles,
-                                       const Ray& ray, TraversalCost* cost) {
-  const PreparedRay prepared(tree, ray);
-  if (prepared.valid) return traverse<any, Boxes>(tree, triangles, prepared, cost);
+template <bool any, class Boxes, class Intersect>
+ZKD_HOST_DEVICE inline typename Intersect::Candidate trace(const TreeView& tree,
+                                                           const TriangleView& triangles,
+                                                           const Ray& ray, TraversalCost* cost) {
+  const PreparedRay prepared(tree, ray, Intersect::slab_units);
+  if (prepared.valid) {
+    const Intersect intersect(prepared, ray);
+    return traverse<any, Boxes>(tree, triangles, prepared, intersect, cost);
+  }
   if (cost != nullptr) *cost = {};
   return {};
 }
 
 /// The nearest hit by a loop over all triangles. A ray is prepared by the tree's bounds and scale,
 /// as for a walk.
-ZKD_HOST_DEVICE inline Candidate trace_brute_force(const TreeView& tree,
-                                                   const TriangleView& triangles, const Ray& ray) {
-  const PreparedRay prepared(tree, ray);
-  Candidate best;
+template <class Intersect>
+ZKD_HOST_DEVICE inline typename Intersect::Candidate trace_brute_force(
+    const TreeView& tree, const TriangleView& triangles, const Ray& ray) {
+  const PreparedRay prepared(tree, ray, Intersect::slab_units);
+  const Intersect intersect(prepared, ray);
+  typename Intersect::Candidate best;
   for (std::uint32_t id = 0; prepared.valid && id < triangles.triangle_count; ++id) {
     const Corners corners = corners_of(triangles, id);
-    Candidate candidate = best;
+    typename Intersect::Candidate candidate = best;
     // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
-    if (intersect(prepared, corners, id, candidate) && is_valid(corners)) best = candidate;
+    if (intersect(corners, id, candidate) && is_valid(corners)) best = candidate;
   }
   return best;
-}
-
-ZKD_HOST_DEVICE inline Hit to_hit(const Candidate& candidate) {
-  if (!candidate.found()) return {};
-  return {candidate.callers_t, candidate.u, candidate.v, candidate.triangle};
 }
 
 }  // namespace zkd::core

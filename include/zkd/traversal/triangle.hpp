@@ -45,9 +45,10 @@ ZKD_HOST_DEVICE inline bool all_finite(const Corners& c) {
   return largest < 0x7F800000u;
 }
 
-/// Whether the sum of six doubles is exactly zero, by keeping every rounding error (Shewchuk 1997,
-/// grow-expansion: after each step the components add up to the exact sum and do not overlap).
-ZKD_HOST_DEVICE inline bool sums_to_zero(const Wide (&terms)[6]) {
+/// The sum of six doubles to an ulp, and with the exact sign: every rounding error is kept
+/// (Shewchuk 1997, grow-expansion: after each step the components add up to the exact sum, do not
+/// overlap, and grow, so that the last that is not zero outweighs those before it).
+ZKD_HOST_DEVICE inline Wide exact_sum(const Wide (&terms)[6]) {
   Wide expansion[6];
   int length = 0;
   for (const Wide term : terms) {
@@ -60,13 +61,28 @@ ZKD_HOST_DEVICE inline bool sums_to_zero(const Wide (&terms)[6]) {
     }
     expansion[length++] = carry;
   }
-  for (int i = 0; i < length; ++i)
-    if (expansion[i].value != 0.0) return false;
-  return true;
+  Wide total = 0.0;
+  for (int i = 0; i < length; ++i) total = total + expansion[i];
+  return total;
 }
 
-/// Twice the signed area of the triangle's projection along one axis: is it exactly zero?
+/// Twice the signed area of the triangle (a, b, c) in a plane, to an ulp and with the exact sign.
 /// The products of two floats are exact in double.
+ZKD_HOST_DEVICE inline Wide projected_area(Wide ax, Wide ay, Wide bx, Wide by, Wide cx, Wide cy) {
+  const Wide terms[6] = {ax * by, -(ay * bx), bx * cy, -(by * cx), cx * ay, -(cy * ax)};
+  return exact_sum(terms);
+}
+
+/// Component `axis` of (b - a) x (c - a), to an ulp and with the exact sign.
+ZKD_HOST_DEVICE inline Wide normal(const Corners& c, int axis) {
+  const int i = axis == 2 ? 0 : axis + 1;
+  const int j = i == 2 ? 0 : i + 1;
+  return projected_area(static_cast<double>(c.p[0][i]), static_cast<double>(c.p[0][j]),
+                        static_cast<double>(c.p[1][i]), static_cast<double>(c.p[1][j]),
+                        static_cast<double>(c.p[2][i]), static_cast<double>(c.p[2][j]));
+}
+
+/// Is the area of the triangle's projection exactly zero?
 ZKD_HOST_DEVICE inline bool projection_has_zero_area(Wide ax, Wide ay, Wide bx, Wide by, Wide cx,
                                                      Wide cy) {
   const Wide left = (bx - ax) * (cy - ay);
@@ -74,8 +90,7 @@ ZKD_HOST_DEVICE inline bool projection_has_zero_area(Wide ax, Wide ay, Wide bx, 
   // Shewchuk's bound for the sign of the difference, (3 + 16 u) u with u = 2^-53.
   const Wide bound = Wide(3.3306690738754716e-16) * (magnitude(left) + magnitude(right));
   if (magnitude(left - right) > bound) return false;
-  const Wide terms[6] = {ax * by, -(ay * bx), bx * cy, -(by * cx), cx * ay, -(cy * ax)};
-  return sums_to_zero(terms);
+  return projected_area(ax, ay, bx, by, cx, cy) == Wide(0.0);
 }
 
 /// Exactly: corners that coincide or lie on one line. A float cross product of zero would also

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Ray against triangle in single precision: the intersectors that most renderers use. The constants
+// are derived in docs/accuracy.md. For device code and the library: see arithmetic.hpp.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/geometry.hpp>
+#include <zkd/traversal/arithmetic.hpp>
+#include <zkd/traversal/candidate.hpp>
+#include <zkd/traversal/intersect.hpp>
+#include <zkd/traversal/ray.hpp>
+#include <zkd/traversal/triangle.hpp>
+
+namespace zkd::core {
+
+/// Intersector::single_precision: Woop, Benthin, Wald 2013, with Kahan's difference of products in
+/// the place of their fallback to double; that is asked only where single precision underflows.
+class SinglePrecision {
+ public:
+  using Candidate = core::Candidate;
+  static constexpr float slab_units = 30.0F;  // 4, and 24 for a hit ("Single precision")
+  static constexpr double plane_margin = 0x1p-15;
+
+  ZKD_HOST_DEVICE SinglePrecision(const PreparedRay& ray, const Ray&) : ray_(ray) {}
+
+  ZKD_HOST_DEVICE bool operator()(const Corners& corners, std::uint32_t id, Candidate& best) const {
+    Sheared<float> sheared;
+    for (int i = 0; i < 3; ++i) {
+      sheared.depth[i] = ray_.from_origin(corners.p[i], 2);
+      sheared.x[i] = fma(-ray_.shear[0], sheared.depth[i], ray_.from_origin(corners.p[i], 0));
+      sheared.y[i] = fma(-ray_.shear[1], sheared.depth[i], ray_.from_origin(corners.p[i], 1));
+    }
+    Real w[3];
+    sheared.weights(w);
+    if (opposite(w)) return false;
+    const Real sum = w[0] + w[1] + w[2];
+    // Below 2^-100 underflow takes digits that the signs rest on.
+    constexpr float smallest = 7.8886091e-31F;
+    Crossing crossing;
+    if (magnitude(sum) > Real(smallest))
+      crossing = sheared.at(w, sum, ray_.shear[2]);
+    else if (!crosses(ray_, corners, crossing))
+      return false;
+    return accept(ray_, crossing, id, best);
+  }
+
+ private:
+  const PreparedRay& ray_;
+};
+
+/// Intersector::fast: Moeller, Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, JGT 1997,
+/// along the sheared ray. Where the point it finds on the ray is not the one it finds on the
+/// triangle (seen edge-on, rounding puts t far outside), double precision is asked.
+class Fast {
+ public:
+  using Candidate = core::Candidate;
+  static constexpr float slab_units = 32.0F;  // 4, and 26 for a hit ("Fast")
+  static constexpr double plane_margin = 0x1p-15;
+
+  ZKD_HOST_DEVICE Fast(const PreparedRay& ray, const Ray&) : ray_(ray) {}
+
+  ZKD_HOST_DEVICE bool operator()(const Corners& corners, std::uint32_t id, Candidate& best) const {
+    // In the order kx, ky, kz, with a direction of (shear[0], shear[1], 1).
+    Real to_a[3];
+    Real ab[3];
+    Real ac[3];
+    for (int i = 0; i < 3; ++i) {
+      to_a[i] = ray_.from_origin(corners.p[0], i);
+      ab[i] = ray_.along_edge(corners.p[0], corners.p[1], i);
+      ac[i] = ray_.along_edge(corners.p[0], corners.p[2], i);
+    }
+    // P = d x ac, Q = ab x (a - o): the determinant is ab . P.
+    const Real p[3] = {ray_.shear[1] * ac[2] - ac[1], ac[0] - ray_.shear[0] * ac[2],
+                       ray_.shear[0] * ac[1] - ray_.shear[1] * ac[0]};
+    const Real determinant = ab[0] * p[0] + ab[1] * p[1] + ab[2] * p[2];
+    const Real zero = 0.0F;
+    const Real one = 1.0F;
+    if (!(determinant < zero) && !(determinant > zero)) return false;
+    const Real inverse = one / determinant;
+    const Real u = -(to_a[0] * p[0] + to_a[1] * p[1] + to_a[2] * p[2]) * inverse;
+    if (!(u >= zero && u <= one)) return false;
+    const Real q[3] = {ab[1] * to_a[2] - ab[2] * to_a[1], ab[2] * to_a[0] - ab[0] * to_a[2],
+                       ab[0] * to_a[1] - ab[1] * to_a[0]};
+    const Real v = (ray_.shear[0] * q[0] + ray_.shear[1] * q[1] + q[2]) * inverse;
+    if (!(v >= zero && u + v <= one)) return false;
+    const Real depth = (ac[0] * q[0] + ac[1] * q[1] + ac[2] * q[2]) * inverse;
+
+    Crossing crossing = {static_cast<double>((depth * ray_.shear[2]).value),
+                         static_cast<double>(u.value), static_cast<double>(v.value)};
+    constexpr float unit = 1.0F / 16777216.0F;
+    const Real allowed = Real(16.0F * unit) * ray_.reach;
+    const Real on_ray[3] = {ray_.shear[0] * depth, ray_.shear[1] * depth, depth};
+    bool consistent = true;
+    for (int i = 0; i < 3; ++i) {
+      const Real on_triangle = to_a[i] + u * ab[i] + v * ac[i];
+      consistent = consistent && magnitude(on_triangle - on_ray[i]) <= allowed;
+    }
+    if (!consistent && !crosses(ray_, corners, crossing)) return false;
+    return accept(ray_, crossing, id, best);
+  }
+
+ private:
+  const PreparedRay& ray_;
+};
+
+}  // namespace zkd::core
