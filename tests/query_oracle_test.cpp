@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -58,7 +59,7 @@ std::vector<Ray> rays_for(const test::NamedMesh& m, const test::PlatformTree& tr
 }
 
 void report(const std::string& name, const verify::Summary& total) {
-  std::printf("%-24s rays %8llu, in the band: missed %llu, phantom %llu, wrong triangle %llu\n",
+  std::printf("%-36s rays %8llu, in the band: missed %llu, phantom %llu, wrong triangle %llu\n",
               name.c_str(), static_cast<unsigned long long>(total.rays),
               static_cast<unsigned long long>(total.in_band.missed),
               static_cast<unsigned long long>(total.in_band.phantom),
@@ -88,24 +89,34 @@ void expect_none_outside_band(const verify::Summary& one, const verify::Oracle& 
 class QueryOracle : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(QueryOracle, NothingOutsideTheBand) {
-  verify::Summary total;
+  std::map<Intersector, verify::Summary> totals;
   std::string name;
   for (std::uint64_t seed = 100; seed < 103; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
     name = m.name;
     const verify::Oracle oracle(m.mesh.view());
     for (const References references : {References::once, References::all}) {
-      SCOPED_TRACE("seed " + std::to_string(seed) + ", " + to_string(references));
       const test::PlatformTree tree(m.mesh.view(), options_for(references));
       const std::vector<Ray> rays = rays_for(m, tree, 600, seed);
-      const std::vector<Hit> hits = tree.closest_hits(rays);
-      const verify::Summary one = verify::check(oracle, m.mesh.view(), rays, hits, 2);
-      total.add_counts(one);
-      expect_none_outside_band(one, oracle, m, rays, hits);
-      if (testing::Test::HasFailure()) return;
+      for (const Intersector intersector : test::intersectors()) {
+        SCOPED_TRACE("seed " + std::to_string(seed) + ", " + to_string(references) + ", " +
+                     to_string(intersector));
+        const std::vector<Hit> hits =
+            tree.closest_hits(rays, test::Walk::automatic, nullptr, intersector);
+        const verify::Summary one =
+            verify::check(oracle, m.mesh.view(), rays, hits, 2, {}, intersector);
+        totals[intersector].add_counts(one);
+        expect_none_outside_band(one, oracle, m, rays, hits);
+        if (intersector == Intersector::exact) {
+          EXPECT_EQ(one.correct, one.rays);
+          EXPECT_LE(one.t_ulp_max, 0.5000001);
+        }
+        if (testing::Test::HasFailure()) return;
+      }
     }
   }
-  report(name, total);
+  for (const auto& [intersector, total] : totals)
+    report(name + ", " + to_string(intersector), total);
 }
 
 #if defined(ZKD_TEST_EMBREE)
@@ -198,7 +209,8 @@ Disagreements compare(const test::NamedMesh& m, const std::vector<Ray>& rays,
     if (other.triangle == hits[i].triangle) continue;
     ++d.all;
     const verify::Verdict ours = verify::judge(oracle, m.mesh.view(), rays[i], hits[i]);
-    const verify::Verdict theirs = verify::judge(oracle, m.mesh.view(), rays[i], other);
+    const verify::Verdict theirs =
+        verify::judge(oracle, m.mesh.view(), rays[i], other, Intersector::single_precision);
     if (theirs.kind != verify::Verdict::correct && !theirs.in_band) ++d.embree_wrong;
     if (ours.kind == verify::Verdict::correct) continue;
     if (ours.in_band) {

@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which wrong answers rounding excuses.
+// Which wrong answers rounding excuses. An intersector's answer is the exact one for corners that
+// are each moved a little (docs/accuracy.md), and that decides what may be excused:
 //
-// The intersector judged is the watertight one (Woop, Benthin, Wald 2013): it moves the origin into
-// the ray's, shears the ray onto its longest axis z, takes the signs of the three edge functions of
-// the sheared corners exactly, and t from the sheared corners weighted by the edge functions. Its
-// answer is thus the exact one for corners that are each moved a little, and that decides what may
-// be excused:
-//
-// - The determinant of an edge (A, B) is d_z * (A_x B_y - A_y B_x) in sheared coordinates
-//   A_x = p_x - (d_x / d_z) * p_z, p = a - o. A_x is off by at most 4 * 2^-24 * (|p_x| +
-//   |d_x / d_z * p_z|): one rounding of p, three of the product, one of the sum. The determinant
-//   moves accordingly, which for a small triangle far away is less by orders of magnitude than
-//   2^-24 times the permanent. The band is the smaller of both, with a factor of 16 in each. A
-//   scene is brought to coordinates of 2^-16 to 2^32; each of its edge functions is then off by
-//   2 * 2^-149 at most where products underflow, 2^-116 of the square of its extent.
+// - The determinant of an edge (A, B) is d_z * (A_x B_y - A_y B_x) in sheared coordinates. Moving
+//   the corners by what the intersector promises moves the determinant accordingly, which for a
+//   small triangle far away is less by orders of magnitude than a unit of its terms. An edge whose
+//   exact determinant is not larger may be taken for its opposite side.
 // - A triangle that the ray hits by more than the band, at a t certainly between the ray's ends,
 //   must have been found: an answer beyond it (or none) is an error.
 // - A triangle that the ray misses may be answered only where the point answered, o + t * d, is on
@@ -33,14 +25,37 @@
 namespace zkd::verify {
 namespace {
 
+// Distances are compared with bounds near the last bit of a double, so they are taken of numbers
+// that have more bits where the machine has them.
+using Long = long double;
+using LongPoint = std::array<Long, 3>;
+
 // What a t next to zero is rounded by when it is answered as a float.
 constexpr double smallest_float = 0x1p-149;
 
-double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-double length(const Point& a) { return std::sqrt(dot(a, a)); }
+// What products of two coordinates lose to underflow in single precision, of the square of the
+// largest: a scene is brought to coordinates of 2^-16 to 2^32, and 2^-148 of its units lost.
+constexpr double lost_products = 0x1p-110;
+
+// An origin this many times the largest coordinate away is brought near the scene first.
+constexpr double far_origin = 8.0;
+
+Long dot(const LongPoint& a, const LongPoint& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Long length(const LongPoint& a) { return std::sqrt(dot(a, a)); }
+LongPoint difference(const LongPoint& a, const LongPoint& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+LongPoint wide(const Point& p) { return {p[0], p[1], p[2]}; }
 
 Point point(const glm::vec3& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+}
+
+// The float ulp at x.
+double float_ulp(double x) {
+  int exponent = 0;
+  std::frexp(x, &exponent);
+  return std::ldexp(1.0, x == 0.0 ? -149 : std::max(exponent - 24, -149));
 }
 
 // A number and the magnitude below which its sign is excused.
@@ -51,72 +66,145 @@ struct Banded {
   [[nodiscard]] bool excused() const { return std::abs(value) < band; }
 };
 
+// A ray and what is known of the scene it is shot at.
+struct Judged {
+  Judged(const Oracle& oracle, const Ray& caller, Intersector intersector)
+      : ray(caller),
+        bounds(bounds_of(intersector)),
+        underflow(bounds.unit > 0x1p-50
+                      ? lost_products * oracle.largest_coordinate() * oracle.largest_coordinate()
+                      : 0.0),
+        o(point(caller.origin)),
+        d(point(caller.direction)),
+        lost(bounds.unit == 0.0 ? 0.0 : 4.0 * oracle.lost_by_scaling()) {
+    double away = 0.0;
+    LongPoint to_centre{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (std::abs(d[a]) > std::abs(d[z])) z = a;
+      away = std::max({away, oracle.box().lo[a] - o[a], o[a] - oracle.box().hi[a]});
+      to_centre[a] = 0.5L * (Long{oracle.box().lo[a]} + Long{oracle.box().hi[a]}) - Long{o[a]};
+    }
+    if (away > far_origin * oracle.largest_coordinate()) {
+      shift = dot(to_centre, wide(d)) / dot(wide(d), wide(d));
+      // The moved origin is rounded to a double, at most 16 times the largest coordinate out.
+      if (bounds.unit != 0.0) lost += 2.0 * 16.0 * 0x1p-53 * oracle.largest_coordinate();
+    }
+  }
+
+  // Coordinate `axis` of a point from the moved origin: without an error, but for its own rounding
+  // (Knuth's sum, Dekker's product).
+  [[nodiscard]] Long from_origin(double x, std::size_t axis) const {
+    const Long base = Long{x} - Long{o[axis]};
+    const Long subtracted = Long{x} - base;
+    const Long base_rest = (Long{x} - (base + subtracted)) - (Long{o[axis]} - subtracted);
+    const Long product = shift * Long{d[axis]};
+    const Long product_rest = std::fma(shift, Long{d[axis]}, -product);
+    const Long difference = base - product;
+    const Long removed = base - difference;
+    const Long difference_rest = (base - (difference + removed)) - (product - removed);
+    return difference + (difference_rest + (base_rest - product_rest));
+  }
+
+  const Ray& ray;
+  Bounds bounds;
+  double underflow;
+  Point o;
+  Point d;
+  std::size_t z = 0;  // the axis along which d is longest
+  Long shift = 0.0L;  // how far along the ray its origin is brought
+  double lost;        // how far scaling and moving may have moved a sheared coordinate
+};
+
 // What decides about one ray and one triangle.
 struct Facts {
   Banded edge[3];      // determinants of the edges: all of one sign inside
   Banded along;        // d . n: zero for a ray in the plane
   double t;            // where the ray meets the plane; NaN for a ray in the plane
-  double t_allowance;  // how well a float intersector knows t; infinite for a ray in the plane
-  double reach;        // largest |corner - o|
-  double lost;         // how far scaling may have moved a sheared coordinate
+  double t_allowance;  // how well the intersector knows t; infinite for a ray in the plane
+  double reach;        // largest |corner - o| along an axis
 };
 
-// `lost`: how far scaling may have moved a coordinate, at most.
-Facts examine(const Point& o, const Point& d, const Corners& corners, double lost) {
+Facts examine(const Judged& judged, const Corners& corners) {
+  const Bounds& bounds = judged.bounds;
+  const Point& d = judged.d;
+  const std::size_t z = judged.z;
+  const std::size_t across[2] = {(z + 1) % 3, (z + 2) % 3};
+  const double depth = std::abs(d[z]);
   Facts facts{};
-  facts.lost = 4.0 * lost;
-  Corners p{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    p[i] = difference(corners[i], o);
-    facts.reach = std::max(facts.reach, length(p[i]));
-  }
 
-  std::size_t z = 0;
-  for (std::size_t axis = 1; axis < 3; ++axis) {
-    if (std::abs(d[axis]) > std::abs(d[z])) z = axis;
-  }
-  const std::size_t x = (z + 1) % 3;
-  const std::size_t y = (z + 2) % 3;
-  struct Sheared {
+  struct Corner {
     double at[2];     // sheared coordinates
-    double moved[2];  // how far the band lets each move
+    double moved[2];  // how far they may be moved
+    double size[3];   // magnitudes from the origin, in the order x, y, z
   };
-  Sheared sheared[3];
+  Corner corner[3];
+  double furthest = 0.0;  // along z
+  double moved[2] = {0.0, 0.0};
   for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t across[2] = {x, y};
+    Long p[3];
+    for (std::size_t a = 0; a < 3; ++a) {
+      p[a] = judged.from_origin(corners[i][a], a);
+      facts.reach = std::max(facts.reach, static_cast<double>(std::abs(p[a])));
+    }
+    furthest = std::max(furthest, static_cast<double>(std::abs(p[z])));
+    corner[i].size[2] = static_cast<double>(std::abs(p[z]));
     for (std::size_t k = 0; k < 2; ++k) {
-      const double shift = d[across[k]] / d[z] * p[i][z];
-      sheared[i].at[k] = p[i][across[k]] - shift;
-      sheared[i].moved[k] = determinant_band * (std::abs(p[i][across[k]]) + std::abs(shift));
+      const Long sheared = Long{d[across[k]]} / Long{d[z]} * p[z];
+      corner[i].at[k] = static_cast<double>(p[across[k]] - sheared);
+      corner[i].size[k] = static_cast<double>(std::abs(p[across[k]]));
+      corner[i].moved[k] = bounds.unit * (bounds.corner * corner[i].size[k] +
+                                          bounds.sheared * static_cast<double>(std::abs(sheared))) +
+                           judged.lost;
+      moved[k] = std::max(moved[k], corner[i].moved[k]);
     }
   }
+  // The terms that a product of `fast` is summed from, along the sheared ray.
+  const double slope[2] = {std::abs(d[across[0]]) / depth, std::abs(d[across[1]]) / depth};
+  const auto terms = [&slope](const double(&p)[3], const double(&q)[3]) {
+    return p[0] * q[1] + p[1] * q[0] + slope[1] * (p[2] * q[0] + p[0] * q[2]) +
+           slope[0] * (p[1] * q[2] + p[2] * q[1]);
+  };
+  double side[2][3];  // magnitudes of the edges from corner 0
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t axis = k < 2 ? across[k] : z;
+      side[i][k] = std::abs(corners[i + 1][axis] - corners[0][axis]);
+    }
+  }
+  const double product = bounds.product * bounds.unit;
+  const double product_error[3] = {
+      product * terms(corner[0].size, side[0]),
+      product * (terms(corner[0].size, side[0]) + terms(corner[0].size, side[1]) +
+                 terms(side[0], side[1])),
+      product * terms(corner[0].size, side[1])};
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t j = (i + 1) % 3;
-    const Sheared& a = sheared[i];
-    const Sheared& b = sheared[j];
-    const double moved = a.moved[0] * std::abs(b.at[1]) + std::abs(a.at[0]) * b.moved[1] +
-                         a.moved[1] * std::abs(b.at[0]) + std::abs(a.at[1]) * b.moved[0] +
-                         a.moved[0] * b.moved[1] + a.moved[1] * b.moved[0];
-    const Determinant exact = determinant(d, p[i], p[j]);
-    const double underflow = underflow_band * std::abs(d[z]) * facts.reach * facts.reach;
-    double collapse = facts.lost * facts.lost;
-    for (int k = 0; k < 2; ++k) collapse += facts.lost * (std::abs(a.at[k]) + std::abs(b.at[k]));
-    const double rounding = std::min(determinant_band * exact.permanent, std::abs(d[z]) * moved);
-    // The sign is exact; where the filter cannot tell, the value is far below any band but 0.
-    const int sign = determinant_sign(d, o, corners[i], corners[j]);
-    facts.edge[i] = {
-        sign * std::abs(exact.value),
-        exact.permanent == 0.0 ? 0.0 : rounding + underflow + std::abs(d[z]) * collapse};
+    const Corner& a = corner[i];
+    const Corner& b = corner[j];
+    double band = product_error[i];
+    if (bounds.product == 0.0) {
+      band = a.moved[0] * std::abs(b.at[1]) + std::abs(a.at[0]) * b.moved[1] +
+             a.moved[1] * std::abs(b.at[0]) + std::abs(a.at[1]) * b.moved[0] +
+             a.moved[0] * b.moved[1] + a.moved[1] * b.moved[0];
+    }
+    band += judged.underflow;
+    // Where no coordinate is rounded there is no excuse.
+    const bool flat = bounds.product == 0.0 && a.at[0] == 0.0 && b.at[0] == 0.0 &&
+                      a.moved[0] == 0.0 && b.moved[0] == 0.0;
+    facts.edge[i] = {determinant_value(d, judged.o, corners[i], corners[j]),
+                     flat ? 0.0 : depth * band};
   }
 
-  const PlaneHit plane = plane_hit(o, d, corners);
-  const Determinant along =
-      determinant(d, difference(corners[1], corners[0]), difference(corners[2], corners[0]));
-  facts.along = {plane.denominator, determinant_band * along.permanent};
+  const PlaneHit plane = plane_hit(judged.o, d, corners);
+  facts.along = {plane.denominator, depth * product * terms(side[0], side[1])};
   facts.t = plane.t;
-  facts.t_allowance =
-      (t_band * facts.reach + facts.lost) * plane.normal / std::abs(plane.denominator) +
-      smallest_float;
+  // In the moved triangle's plane; and how far t may be from that.
+  facts.t_allowance = (moved[0] + moved[1]) * plane.normal / std::abs(plane.denominator) +
+                      bounds.unit * bounds.t * furthest / depth +
+                      (bounds.unit == 0.0 ? 0.0 : 0x1p-51 * std::abs(plane.t) + smallest_float);
+  if (bounds.product != 0.0)
+    facts.t_allowance +=
+        bounds.unit * bounds.hit * facts.reach * plane.normal / std::abs(plane.denominator);
   return facts;
 }
 
@@ -125,26 +213,29 @@ bool may_be_missed(const Facts& facts, const Ray& ray) {
   for (const Banded& edge : facts.edge) {
     if (edge.excused()) return true;
   }
+  if (facts.along.excused()) return true;
   const auto near = [&](float end) {
     return std::abs(facts.t - static_cast<double>(end)) < facts.t_allowance;
   };
-  return facts.along.excused() || near(ray.t_min) || near(ray.t_max);
+  return near(ray.t_min) || near(ray.t_max);
 }
 
 // Distance from q to a closed triangle of non-zero area: to its plane where the foot is inside,
 // else to the nearest edge.
-double distance(const Point& q, const Corners& corners) {
-  const Point ab = difference(corners[1], corners[0]);
-  const Point ac = difference(corners[2], corners[0]);
-  const Point n = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2],
-                   ab[0] * ac[1] - ab[1] * ac[0]};
-  double nearest = std::numeric_limits<double>::infinity();
-  bool inside = dot(n, n) > 0.0;
+Long distance(const LongPoint& q, const LongPoint (&corners)[3]) {
+  const LongPoint ab = difference(corners[1], corners[0]);
+  const LongPoint ac = difference(corners[2], corners[0]);
+  const LongPoint n = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2],
+                       ab[0] * ac[1] - ab[1] * ac[0]};
+  Long nearest = std::numeric_limits<Long>::infinity();
+  bool inside = dot(n, n) > 0.0L;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Point edge = difference(corners[(i + 1) % 3], corners[i]);
-    const Point to_q = difference(q, corners[i]);
-    inside = inside && determinant(n, edge, to_q).value >= 0.0;
-    const double along = std::clamp(dot(to_q, edge) / dot(edge, edge), 0.0, 1.0);
+    const LongPoint edge = difference(corners[(i + 1) % 3], corners[i]);
+    const LongPoint to_q = difference(q, corners[i]);
+    const LongPoint outward = {edge[1] * n[2] - edge[2] * n[1], edge[2] * n[0] - edge[0] * n[2],
+                               edge[0] * n[1] - edge[1] * n[0]};
+    inside = inside && dot(outward, to_q) <= 0.0L;
+    const Long along = std::clamp(dot(to_q, edge) / dot(edge, edge), 0.0L, 1.0L);
     nearest = std::min(nearest, length({to_q[0] - along * edge[0], to_q[1] - along * edge[1],
                                         to_q[2] - along * edge[2]}));
   }
@@ -154,10 +245,38 @@ double distance(const Point& q, const Corners& corners) {
   return nearest;
 }
 
+// The least distance from the triangle of a point o + s * d, s being what rounds to the float t.
+// Distance is convex along a line: by ternary search.
+Long distance_of_answer(const Judged& judged, double t, const Corners& corners) {
+  LongPoint seen[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      seen[i][a] = judged.from_origin(corners[i][a], a);
+    }
+  }
+  // From the moved origin, so that no digit is lost.
+  const auto at = [&](Long along) {
+    return distance({along * judged.d[0], along * judged.d[1], along * judged.d[2]}, seen);
+  };
+  const Long answered = Long{t} - judged.shift;
+  Long lo = answered - 0.5L * Long{float_ulp(t)};
+  Long hi = answered + 0.5L * Long{float_ulp(t)};
+  for (int i = 0; i < 200 && lo < hi; ++i) {
+    const Long third = (hi - lo) / 3.0L;
+    if (at(lo + third) <= at(hi - third))
+      hi -= third;
+    else
+      lo += third;
+  }
+  return std::min({at(lo), at(hi), at(answered)});
+}
+
 // Whether an intersector that errs within the band may answer `hit` on a triangle that the ray
 // exactly misses.
-bool may_be_invented(const Facts& facts, const Ray& ray, const Hit& hit, const Corners& corners) {
-  if (!(hit.t >= ray.t_min && hit.t <= ray.t_max) || !std::isfinite(hit.t)) return false;
+bool may_be_invented(const Judged& judged, const Facts& facts, const Hit& hit,
+                     const Corners& corners) {
+  if (!(hit.t >= judged.ray.t_min && hit.t <= judged.ray.t_max) || !std::isfinite(hit.t))
+    return false;
   bool left = true;
   bool right = true;
   bool rounded = false;
@@ -169,25 +288,29 @@ bool may_be_invented(const Facts& facts, const Ray& ray, const Hit& hit, const C
   if (!left && !right) return false;
   // All three exactly zero without a rounding: every intersector sees the coplanar ray.
   if (facts.along.value == 0.0 && !rounded) return false;
-  // The point answered, seen from the origin: each corner moved by t_band * reach at most, and t
-  // rounded by as much.
-  const Point o = point(ray.origin);
-  const Point d = point(ray.direction);
-  const auto t = static_cast<double>(hit.t);
-  const Corners seen = {difference(corners[0], o), difference(corners[1], o),
-                        difference(corners[2], o)};
-  return distance({t * d[0], t * d[1], t * d[2]}, seen) <=
-         2.0 * t_band * facts.reach + facts.lost + smallest_float * length(d);
-}
-
-// The float ulp at x.
-double float_ulp(double x) {
-  int exponent = 0;
-  std::frexp(x, &exponent);
-  return std::ldexp(1.0, x == 0.0 ? -149 : std::max(exponent - 24, -149));
+  // A bound along each axis is one of sqrt(3) times as much on the distance.
+  const double allowed =
+      1.7320508075688773 * (judged.bounds.unit * judged.bounds.hit * facts.reach + judged.lost);
+  return distance_of_answer(judged, static_cast<double>(hit.t), corners) <= Long{allowed};
 }
 
 }  // namespace
+
+Bounds bounds_of(Intersector intersector) noexcept {
+  switch (intersector) {
+    case Intersector::watertight:
+    case Intersector::double_precision:
+      return {.unit = 0x1p-53, .corner = 2.0, .sheared = 4.0, .hit = 20.0, .t = 14.0};
+    case Intersector::single_precision:
+      return {.unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 24.0, .t = 15.0};
+    case Intersector::fast:
+      return {
+          .unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 26.0, .t = 15.0, .product = 16.0};
+    case Intersector::exact:
+      break;
+  }
+  return {};
+}
 
 const char* to_string(Verdict::Kind kind) noexcept {
   switch (kind) {
@@ -203,55 +326,62 @@ const char* to_string(Verdict::Kind kind) noexcept {
   return "?";
 }
 
-Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ray, const Hit& hit) {
+Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ray, const Hit& hit,
+              Intersector intersector) {
   const ExactHit exact = oracle.closest_hit(ray);
   const bool answered = hit.triangle != no_triangle;
   Verdict verdict;
   if (!exact.hit && !answered) return verdict;
+  const auto examined = [&](const Judged& judged, std::size_t triangle) {
+    return examine(judged, *finite_corners(triangles, triangle));
+  };
   if (exact.hit && answered &&
       std::binary_search(exact.ties.begin(), exact.ties.end(), hit.triangle)) {
-    verdict.t_ulp = std::abs(static_cast<double>(hit.t) - exact.t) / float_ulp(exact.t);
-    if (std::isnan(verdict.t_ulp)) verdict.t_ulp = std::numeric_limits<double>::infinity();
+    const double off = std::abs(static_cast<double>(hit.t) - exact.t);
+    verdict.t_ulp =
+        std::isnan(off) ? std::numeric_limits<double>::infinity() : off / float_ulp(exact.t);
+    if (verdict.t_ulp > 0.5) {
+      const Facts facts = examined(Judged(oracle, ray, intersector), hit.triangle);
+      // exact.t was rounded to a double.
+      verdict.t_in_bound =
+          off <= facts.t_allowance + 0.5 * float_ulp(exact.t) + 0x1p-52 * std::abs(exact.t);
+    }
     return verdict;
   }
   verdict.kind = !exact.hit  ? Verdict::phantom
                  : !answered ? Verdict::missed
                              : Verdict::wrong_triangle;
+  if (answered && (degenerate(ray) || hit.triangle >= triangles.triangle_count ||
+                   !valid_triangle(triangles, hit.triangle))) {
+    return verdict;
+  }
 
   const std::vector<std::uint32_t> hits = oracle.all_hits(ray);
-  const Point o = point(ray.origin);
-  const Point d = point(ray.direction);
-  const auto examined = [&](std::size_t triangle) {
-    return examine(o, d, *finite_corners(triangles, triangle), oracle.lost_by_scaling());
-  };
+  const Judged judged(oracle, ray, intersector);
 
   // The triangle answered must be a hit, or an excused one, and not in front of what an exact t
   // allows: `chosen` is its t, `allowance` how well it is known.
   double chosen = std::numeric_limits<double>::infinity();
   double allowance = 0.0;
   if (answered) {
-    if (degenerate(ray) || hit.triangle >= triangles.triangle_count ||
-        !valid_triangle(triangles, hit.triangle)) {
-      return verdict;
-    }
-    const Facts facts = examined(hit.triangle);
+    const Facts facts = examined(judged, hit.triangle);
     if (std::binary_search(hits.begin(), hits.end(), hit.triangle)) {
       chosen = facts.t;
       allowance = facts.t_allowance;
     } else {
       const Corners corners = *finite_corners(triangles, hit.triangle);
-      if (!may_be_invented(facts, ray, hit, corners)) return verdict;
+      if (!may_be_invented(judged, facts, hit, corners)) return verdict;
       // Its plane may be nearly along the ray and say nothing of t: the t answered counts.
       chosen = static_cast<double>(hit.t);
-      allowance = smallest_float;
+      allowance = 0.5 * float_ulp(chosen);
     }
   }
 
   // Nothing that had to be found may be nearer.
   for (const std::uint32_t other : hits) {
     if (other == hit.triangle) continue;
-    const Facts facts = examined(other);
-    if (chosen - facts.t <= std::max(allowance, facts.t_allowance)) continue;
+    const Facts facts = examined(judged, other);
+    if (chosen - facts.t <= allowance + facts.t_allowance) continue;
     if (!may_be_missed(facts, ray)) return verdict;
   }
   verdict.in_band = true;

@@ -29,7 +29,9 @@ void count(Part& part, const Verdict& verdict, std::uint64_t ray, bool hit) {
     case Verdict::correct:
       ++summary.correct;
       if (hit) part.t_ulps.push_back(static_cast<float>(verdict.t_ulp));
-      return;
+      if (verdict.t_in_bound) return;
+      ++summary.t_outside;
+      break;
     case Verdict::missed:
       ++summary.missed;
       summary.in_band.missed += excused;
@@ -67,6 +69,7 @@ void Summary::add_counts(const Summary& other) {
   missed += other.missed;
   phantom += other.phantom;
   wrong_triangle += other.wrong_triangle;
+  t_outside += other.t_outside;
   in_band.missed += other.in_band.missed;
   in_band.phantom += other.in_band.phantom;
   in_band.wrong_triangle += other.in_band.wrong_triangle;
@@ -74,7 +77,7 @@ void Summary::add_counts(const Summary& other) {
 
 Summary check(const Oracle& oracle, const TriangleView& triangles, std::span<const Ray> rays,
               std::span<const Hit> hits, int threads,
-              const std::function<void(std::uint64_t)>& progress) {
+              const std::function<void(std::uint64_t)>& progress, Intersector intersector) {
   if (rays.size() != hits.size()) {
     throw std::invalid_argument("check: " + std::to_string(rays.size()) + " rays, but " +
                                 std::to_string(hits.size()) + " hits");
@@ -90,7 +93,8 @@ Summary check(const Oracle& oracle, const TriangleView& triangles, std::span<con
       const std::size_t begin = block * block_size;
       const std::size_t end = std::min(begin + block_size, rays.size());
       for (std::size_t i = begin; i < end; ++i) {
-        count(part, judge(oracle, triangles, rays[i], hits[i]), i, hits[i].triangle != no_triangle);
+        count(part, judge(oracle, triangles, rays[i], hits[i], intersector), i,
+              hits[i].triangle != no_triangle);
       }
       done += end - begin;
       if (progress && omp_get_thread_num() == 0) progress(done);

@@ -35,24 +35,27 @@ struct Summary {
   Mistakes in_band;
   double t_ulp_p999 = 0.0;  ///< 99.9th percentile over correct hits, see Verdict::t_ulp
   double t_ulp_max = 0.0;
-  std::vector<std::uint64_t> first_offenders;  ///< the first 10 rays answered outside the band
+  std::uint64_t t_outside = 0;  ///< correct hits whose t is further off than promised
+  std::vector<std::uint64_t> first_offenders;  ///< the first 10 rays answered outside the band or
+                                               ///< with a t outside
 
   /// Answers that are errors: the target is 0.
   [[nodiscard]] std::uint64_t outside_band() const {
-    return missed + phantom + wrong_triangle - in_band.total();
+    return missed + phantom + wrong_triangle - in_band.total() + t_outside;
   }
 
   /// Adds the counts of other rays, not their t_ulp figures nor their first_offenders.
   void add_counts(const Summary& other);
 };
 
-/// Judges hits[i] as the answer to rays[i], on `threads` threads (0: all). `progress` is called now
-/// and then on the calling thread with the rays done so far, at last with their number; it must not
-/// throw. The summary does not depend on the number of threads.
+/// Judges hits[i] as what `intersector` answered to rays[i], on `threads` threads (0: all).
+/// `progress` is called now and then on the calling thread with the rays done so far, at last with
+/// their number; it must not throw. The summary does not depend on the number of threads.
 ///
 /// Throws std::invalid_argument where the spans differ in length.
 [[nodiscard]] Summary check(const Oracle& oracle, const TriangleView& triangles,
                             std::span<const Ray> rays, std::span<const Hit> hits, int threads,
-                            const std::function<void(std::uint64_t)>& progress = {});
+                            const std::function<void(std::uint64_t)>& progress = {},
+                            Intersector intersector = Intersector::watertight);
 
 }  // namespace zkd::verify

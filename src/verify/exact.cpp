@@ -191,14 +191,36 @@ double separation(const Corners& corners, const ExactBox& box) {
   return widest;
 }
 
+namespace {
+
+// In units of a power of two.
+struct IntegerDeterminant {
+  mpz_class value;
+  int exponent;
+
+  IntegerDeterminant(const Point& d, const Point& o, const Point& a, const Point& b) {
+    const int points = common_exponent({o, a, b});
+    const int direction = common_exponent({d});
+    const IntegerPoint origin(o, points);
+    value = dot(IntegerPoint(d, direction),
+                cross(IntegerPoint(a, points) - origin, IntegerPoint(b, points) - origin));
+    exponent = 2 * points + direction;
+  }
+};
+
+}  // namespace
+
 int determinant_sign(const Point& d, const Point& o, const Point& a, const Point& b) {
   const Determinant filter = determinant(d, difference(a, o), difference(b, o));
   if (filter.certain()) return (filter.value > 0.0) - (filter.value < 0.0);
-  const int exponent = common_exponent({o, a, b});
-  const IntegerPoint origin(o, exponent);
-  const IntegerPoint direction(d, common_exponent({d}));
-  return sgn(dot(direction,
-                 cross(IntegerPoint(a, exponent) - origin, IntegerPoint(b, exponent) - origin)));
+  return sgn(IntegerDeterminant(d, o, a, b).value);
+}
+
+double determinant_value(const Point& d, const Point& o, const Point& a, const Point& b) {
+  const Determinant filter = determinant(d, difference(a, o), difference(b, o));
+  if (std::abs(filter.value) > 1e6 * Determinant::bound * filter.permanent) return filter.value;
+  const IntegerDeterminant exact(d, o, a, b);
+  return nearest_double({exact.value, 1, exact.exponent});
 }
 
 PlaneHit plane_hit(const Point& o, const Point& d, const Corners& corners) {

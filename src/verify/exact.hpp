@@ -48,6 +48,10 @@ struct ExactBox {
 /// The exact sign (-1, 0, 1) of det(d, a - o, b - o).
 [[nodiscard]] int determinant_sign(const Point& d, const Point& o, const Point& a, const Point& b);
 
+/// det(d, a - o, b - o), to a millionth of itself.
+[[nodiscard]] double determinant_value(const Point& d, const Point& o, const Point& a,
+                                       const Point& b);
+
 /// det(d, p, q) in double, and its permanent: the same sum with every product taken absolute.
 struct Determinant {
   double value;

@@ -162,13 +162,16 @@ class HitDistance {
     return verify::compare(exact(), other.exact());
   }
 
-  // t_min <= t <= t_max.
+  // t_min <= t <= t_max, and t rounds to a finite float.
   bool within(double t_min, double t_max) {
-    if (lo_ >= t_min && hi_ <= t_max) return true;
+    constexpr double infinite = 0x1.ffffffp127;  // the middle of the largest float and 2^128
+    if (lo_ >= t_min && hi_ <= t_max && lo_ > -infinite && hi_ < infinite) return true;
     if (hi_ < t_min || lo_ > t_max) return false;
     if (t_min == infinity || t_max == -infinity) return false;
     return (t_min == -infinity || verify::compare(exact(), ratio(t_min)) >= 0) &&
-           (t_max == infinity || verify::compare(exact(), ratio(t_max)) <= 0);
+           (t_max == infinity || verify::compare(exact(), ratio(t_max)) <= 0) &&
+           verify::compare(exact(), ratio(-infinite)) > 0 &&
+           verify::compare(exact(), ratio(infinite)) < 0;
   }
 
   double nearest() { return nearest_double(exact()); }
@@ -318,6 +321,7 @@ struct Oracle::Scene {
   std::vector<Triangle> triangles;
   std::vector<BoxNode> nodes;  // empty: every query is a loop over all triangles
   double largest = 0.0;        // magnitude of a coordinate
+  ExactBox box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
 
   // Calls visit(triangle) for every triangle that the ray may meet at t <= t_far, near boxes first;
   // visit may lower t_far, and ends the walk by returning true.
@@ -369,8 +373,11 @@ Oracle::Oracle(const TriangleView& triangles, Search search) {
     for (int corner = 0; corner < 3; ++corner) {
       const float* position = triangles.position(triangles.index(i, corner));
       std::copy_n(position, 3, triangle.corner[corner]);
-      for (int axis = 0; axis < 3; ++axis) {
-        scene->largest = std::max(scene->largest, std::abs(static_cast<double>(position[axis])));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto x = static_cast<double>(position[axis]);
+        scene->largest = std::max(scene->largest, std::abs(x));
+        scene->box.lo[axis] = std::min(scene->box.lo[axis], x);
+        scene->box.hi[axis] = std::max(scene->box.hi[axis], x);
       }
     }
     triangle.id = static_cast<std::uint32_t>(i);
@@ -432,6 +439,10 @@ ExactHit Oracle::closest_hit(const Ray& ray) const {
 double Oracle::lost_by_scaling() const {
   return scene_->largest > 0x1p32 ? 0x1p-149 * scene_->largest : 0.0;
 }
+
+const ExactBox& Oracle::box() const { return scene_->box; }
+
+double Oracle::largest_coordinate() const { return scene_->largest; }
 
 bool Oracle::any_hit(const Ray& ray) const {
   if (degenerate(ray)) return false;

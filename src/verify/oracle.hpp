@@ -13,6 +13,8 @@
 
 #include <zkd/geometry.hpp>
 
+#include "verify/exact.hpp"
+
 namespace zkd::verify {
 
 /// Where the nearest hit lies in the triangles of its tie set.
@@ -71,6 +73,11 @@ class Oracle {
   /// What the library's scaling may take off a coordinate (TreeView::scale): nothing unless the
   /// largest coordinate is above 2^32; then what underflows when that one is brought near 1.
   [[nodiscard]] double lost_by_scaling() const;
+
+  /// The box of the triangles that can be hit, and the largest magnitude of a coordinate in it.
+  /// Nothing to hit: an empty box (lo > hi), and 0.
+  [[nodiscard]] const ExactBox& box() const;
+  [[nodiscard]] double largest_coordinate() const;
 
  private:
   struct Scene;

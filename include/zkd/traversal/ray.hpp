@@ -22,7 +22,6 @@ struct PreparedRay {
   Real origin[3];
   Real inverse[3];          ///< of the direction; large instead of infinite
   Real padding[3];          ///< half-width of a plane, in units of t
-  Real reach;               ///< largest distance along an axis from the origin to the scene box
   Real shear[3];            ///< direction[kx] / direction[kz], [ky] / [kz]; 1 / direction[kz]
   Real permuted_origin[3];  ///< origin in the order kx, ky, kz
   Real permuted_rest[3];    ///< what rounding a moved origin to float took off it
@@ -82,7 +81,7 @@ struct PreparedRay {
         !approach(low, high, direction, from, coordinate))
       return;
 
-    reach = 0.0F;
+    Real reach = 0.0F;
     Real furthest = 0.0F;
     for (int a = 0; a < 3; ++a) {
       origin[a] = static_cast<float>(from[a].value);

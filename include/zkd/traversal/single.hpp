@@ -15,6 +15,9 @@
 
 namespace zkd::core {
 
+/// Sums of products below this lose digits to underflow: double precision is asked.
+inline constexpr float smallest_sum = 7.8886091e-31F;  // 2^-100
+
 /// Intersector::single_precision: Woop, Benthin, Wald 2013, with Kahan's difference of products in
 /// the place of their fallback to double; that is asked only where single precision underflows.
 class SinglePrecision {
@@ -36,10 +39,8 @@ class SinglePrecision {
     sheared.weights(w);
     if (opposite(w)) return false;
     const Real sum = w[0] + w[1] + w[2];
-    // Below 2^-100 underflow takes digits that the signs rest on.
-    constexpr float smallest = 7.8886091e-31F;
     Crossing crossing;
-    if (magnitude(sum) > Real(smallest))
+    if (magnitude(sum) > Real(smallest_sum))
       crossing = sheared.at(w, sum, ray_.shear[2]);
     else if (!crosses(ray_, corners, crossing))
       return false;
@@ -52,7 +53,8 @@ class SinglePrecision {
 
 /// Intersector::fast: Moeller, Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, JGT 1997,
 /// along the sheared ray. Where the point it finds on the ray is not the one it finds on the
-/// triangle (seen edge-on, rounding puts t far outside), double precision is asked.
+/// triangle (seen edge-on, rounding puts t far outside), and where products underflow, double
+/// precision is asked.
 class Fast {
  public:
   using Candidate = core::Candidate;
@@ -62,6 +64,13 @@ class Fast {
   ZKD_HOST_DEVICE Fast(const PreparedRay& ray, const Ray&) : ray_(ray) {}
 
   ZKD_HOST_DEVICE bool operator()(const Corners& corners, std::uint32_t id, Candidate& best) const {
+    Crossing crossing;
+    if (!decide(corners, crossing)) return false;
+    return accept(ray_, crossing, id, best);
+  }
+
+ private:
+  ZKD_HOST_DEVICE bool decide(const Corners& corners, Crossing& crossing) const {
     // In the order kx, ky, kz, with a direction of (shear[0], shear[1], 1).
     Real to_a[3];
     Real ab[3];
@@ -75,9 +84,9 @@ class Fast {
     const Real p[3] = {ray_.shear[1] * ac[2] - ac[1], ac[0] - ray_.shear[0] * ac[2],
                        ray_.shear[0] * ac[1] - ray_.shear[1] * ac[0]};
     const Real determinant = ab[0] * p[0] + ab[1] * p[1] + ab[2] * p[2];
+    if (!(magnitude(determinant) > Real(smallest_sum))) return crosses(ray_, corners, crossing);
     const Real zero = 0.0F;
     const Real one = 1.0F;
-    if (!(determinant < zero) && !(determinant > zero)) return false;
     const Real inverse = one / determinant;
     const Real u = -(to_a[0] * p[0] + to_a[1] * p[1] + to_a[2] * p[2]) * inverse;
     if (!(u >= zero && u <= one)) return false;
@@ -87,21 +96,21 @@ class Fast {
     if (!(v >= zero && u + v <= one)) return false;
     const Real depth = (ac[0] * q[0] + ac[1] * q[1] + ac[2] * q[2]) * inverse;
 
-    Crossing crossing = {static_cast<double>((depth * ray_.shear[2]).value),
-                         static_cast<double>(u.value), static_cast<double>(v.value)};
     constexpr float unit = 1.0F / 16777216.0F;
-    const Real allowed = Real(16.0F * unit) * ray_.reach;
     const Real on_ray[3] = {ray_.shear[0] * depth, ray_.shear[1] * depth, depth};
-    bool consistent = true;
+    Real furthest = zero;
+    Real apart = zero;
     for (int i = 0; i < 3; ++i) {
-      const Real on_triangle = to_a[i] + u * ab[i] + v * ac[i];
-      consistent = consistent && magnitude(on_triangle - on_ray[i]) <= allowed;
+      furthest = larger(furthest, larger(magnitude(to_a[i]), larger(magnitude(to_a[i] + ab[i]),
+                                                                    magnitude(to_a[i] + ac[i]))));
+      apart = larger(apart, magnitude(to_a[i] + u * ab[i] + v * ac[i] - on_ray[i]));
     }
-    if (!consistent && !crosses(ray_, corners, crossing)) return false;
-    return accept(ray_, crossing, id, best);
+    if (!(apart <= Real(16.0F * unit) * furthest)) return crosses(ray_, corners, crossing);
+    crossing = {static_cast<double>((depth * ray_.shear[2]).value), static_cast<double>(u.value),
+                static_cast<double>(v.value)};
+    return true;
   }
 
- private:
   const PreparedRay& ray_;
 };
 
