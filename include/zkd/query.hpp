@@ -5,7 +5,7 @@
 // Rules, the same for every function here and on every backend:
 //
 // - A triangle is hit on both sides, edges and vertices included, and the hit is accepted when
-//   t_min <= t <= t_max for the t that is returned.
+//   t_min <= t <= t_max for the t that is returned (a t below 0 that rounds to 0 is below 0).
 // - The nearest hit wins; of equally near ones, the triangle with the lowest index. Nearness is
 //   compared before t is rounded to the caller's units, which matters for far origins only.
 // - A ray that lies in a triangle's plane, up to the rounding of the intersector, does not hit it.
@@ -56,7 +56,7 @@ enum class Intersector : std::uint8_t {
 
   /// Woop, Benthin, Wald in single precision, with Kahan's difference of products: for devices on
   /// which double precision is slow. Watertight. Within 5 * 2^-24 R; t to (8 k + 15) * 2^-24 R,
-  /// for scenes in which no product of two distances is below 2^-100 of the square of the largest.
+  /// short of underflow.
   single_precision,
 
   /// The answers of `watertight`, bit for bit, by double precision alone: what its filter is
@@ -122,9 +122,8 @@ ZKD_API void closest_hit_brute_force(const cpu::Executor& executor, const TreeVi
 ///
 /// No coordinate moves by more than 2^-46 of the largest coordinate of the triangle (2^-15 for
 /// `fast` and `single_precision`), and on to the next float. That is proven to be enough
-/// (docs/accuracy.md) for directions no longer than 2^100 times that coordinate. The point may lie
-/// behind another triangle that meets this one: what belongs to both is decided by their order
-/// along the ray, not by a distance.
+/// ("Spawned rays" in docs/accuracy.md). Near an edge the point may lie behind another triangle
+/// that meets this one there at less than a right angle, as with every offset.
 ///
 /// `hit` is one of `triangles`, not a miss. O(1); allocates nothing.
 [[nodiscard]] ZKD_API glm::vec3 offset_origin(

@@ -57,7 +57,7 @@ inline Hit to_hit(const ExactCandidate& candidate) { return candidate.hit(); }
 class ExactIntersect {
  public:
   using Candidate = ExactCandidate;
-  static constexpr float slab_units = Watertight::slab_units;
+  static constexpr float hit_distance = Watertight::hit_distance;
   static constexpr double plane_margin = Watertight::plane_margin;
 
   ExactIntersect(const PreparedRay& prepared, const Ray& ray) : prepared_(prepared), ray_(ray) {}

@@ -85,7 +85,12 @@ class FusedBoxTest {
         far[child] = least(far[child], fma(to_far, ray_.inverse[a], ray_.padding[a]).value);
       }
     }
-    return {{near[0], near[1]}, (near[0] <= far[0] ? 1u : 0u) | (near[1] <= far[1] ? 2u : 0u)};
+    const auto meets = [](Real enters, Real leaves) {
+      return fma(magnitude(enters), Real(-box_slack), enters) <=
+             fma(magnitude(leaves), Real(box_slack), leaves);
+    };
+    return {{near[0], near[1]},
+            (meets(near[0], far[0]) ? 1u : 0u) | (meets(near[1], far[1]) ? 2u : 0u)};
   }
 
  private:

@@ -32,9 +32,10 @@ struct Crossing {
   Wide v;
 };
 
-/// What lies behind a hit at t for certain: t moved by more than rounding it to float took.
+/// What lies behind a hit at t for certain: t moved by more than rounding it to float took, and
+/// the test of a box (box_slack).
 ZKD_HOST_DEVICE inline Real limit_behind(Wide t) {
-  constexpr float slack = 1.0F / 4194304.0F;  // 2^-22
+  constexpr float slack = 1.0F / 2097152.0F;  // 2^-21
   const Real rounded = static_cast<float>(t.value);
   return rounded + Real(slack) * magnitude(rounded) + Real(1.0e-37F);
 }
@@ -51,8 +52,11 @@ ZKD_HOST_DEVICE inline bool accept(const PreparedRay& ray, const Crossing& cross
   // Written so that NaN, from coordinates that are not finite, is never accepted.
   if (!(crossing.t <= best.t)) return false;
   if (crossing.t == best.t && !(id < best.triangle)) return false;
-  const float callers_t = ray.callers_t(crossing.t);
+  const Wide unrounded = ray.callers_t(crossing.t);
+  const auto callers_t = static_cast<float>(unrounded.value);
   if (!(ray.t_min <= callers_t && callers_t <= ray.t_max) || !is_finite(callers_t)) return false;
+  // Behind the origin, though by less than a float can say.
+  if (unrounded < Wide(0.0) && !(ray.t_min < 0.0F)) return false;
   best = {crossing.t,
           limit_behind(crossing.t),
           callers_t,

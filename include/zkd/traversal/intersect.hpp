@@ -112,16 +112,16 @@ ZKD_HOST_DEVICE inline bool crosses(const PreparedRay& ray, const Corners& corne
 
 // An intersector is a type that is made from a prepared ray and the caller's, and called with the
 // corners and the id of a triangle and the best candidate so far, which it replaces by a nearer
-// one. `slab_units` is the half-width that boxes need so that no hit of its is lost: 4 units for
-// the test of the box, and how far from the triangle a hit may lie ("Boxes"), in units of 2^-24 of
-// the reach of the scene from the ray's origin. `plane_margin` is how far off a triangle's plane,
-// in units of its largest coordinate, a ray begins that will not hit it ("Spawned rays").
+// one. `hit_distance` is how far from its triangle a hit may lie along an axis, as a part of the
+// reach of the scene from the ray's origin: boxes are padded by it ("Boxes"). `plane_margin` is how
+// far off a triangle's plane, in units of its largest coordinate, a ray begins that will not hit it
+// ("Spawned rays").
 
 /// Intersector::watertight.
 class Watertight {
  public:
   using Candidate = core::Candidate;
-  static constexpr float slab_units = 5.0F;
+  static constexpr float hit_distance = 32.0F * 0x1p-53F;  // 20, and room for roundings
   static constexpr double plane_margin = 0x1p-46;
 
   ZKD_HOST_DEVICE Watertight(const PreparedRay& ray, const Ray&) : ray_(ray) {}
@@ -140,7 +140,7 @@ class Watertight {
 class DoublePrecision {
  public:
   using Candidate = core::Candidate;
-  static constexpr float slab_units = Watertight::slab_units;
+  static constexpr float hit_distance = Watertight::hit_distance;
   static constexpr double plane_margin = Watertight::plane_margin;
 
   ZKD_HOST_DEVICE DoublePrecision(const PreparedRay& ray, const Ray&) : ray_(ray) {}

@@ -21,7 +21,7 @@ struct PreparedRay {
   // In tree space. Axis kz is the one along which the direction is longest; kx, ky follow it.
   Real origin[3];
   Real inverse[3];          ///< of the direction; large instead of infinite
-  Real padding[3];          ///< half-width of a plane, in units of t
+  Real padding[3];          ///< how far from a plane a hit may lie, in units of t
   Real shear[3];            ///< direction[kx] / direction[kz], [ky] / [kz]; 1 / direction[kz]
   Real permuted_origin[3];  ///< origin in the order kx, ky, kz
   Real permuted_rest[3];    ///< what rounding a moved origin to float took off it
@@ -41,9 +41,9 @@ struct PreparedRay {
   Real scale;
   bool valid = false;
 
-  /// `slab_units`: half-width of every box, in units of 2^-24 of the reach ("Boxes" in
-  /// docs/accuracy.md).
-  ZKD_HOST_DEVICE PreparedRay(const TreeView& tree, const Ray& ray, float slab_units)
+  /// `hit_distance`: how far from its triangle a hit may lie along an axis, as a part of the reach:
+  /// the largest distance along an axis from the origin to a side of the scene box.
+  ZKD_HOST_DEVICE PreparedRay(const TreeView& tree, const Ray& ray, float hit_distance)
       : t_min(ray.t_min), t_max(ray.t_max), scale(tree.scale()) {
     const float origin_in[3] = {ray.origin.x, ray.origin.y, ray.origin.z};
     const float direction_in[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
@@ -93,7 +93,7 @@ struct PreparedRay {
     constexpr float unit = 1.0F / 16777216.0F;
     // Boxes are tested from a moved origin that was rounded to float, the intersector's is not.
     const Real rounding = moved ? Real(2.0F * unit) * furthest : Real(0.0F);
-    const Real half_width = Real(slab_units) * Real(unit) * reach + rounding;
+    const Real half_width = Real(hit_distance) * reach + rounding;
 
     Real d[3];
     for (int a = 0; a < 3; ++a) {
@@ -151,9 +151,7 @@ struct PreparedRay {
   }
 
   /// The caller's t of a hit at `t` in tree space.
-  [[nodiscard]] ZKD_HOST_DEVICE float callers_t(Wide t) const {
-    return static_cast<float>(((t + t_shift) * t_scale).value);
-  }
+  [[nodiscard]] ZKD_HOST_DEVICE Wide callers_t(Wide t) const { return (t + t_shift) * t_scale; }
 
  private:
   /// Moves `from` along the ray to the point nearest to the scene's centre. False: that point is so

@@ -15,15 +15,17 @@
 
 namespace zkd::core {
 
-/// Sums of products below this lose digits to underflow: double precision is asked.
-inline constexpr float smallest_sum = 7.8886091e-31F;  // 2^-100
+/// Sums of products below this, or t divided by them, may lose digits to underflow: double
+/// precision is asked. A sum is at most the square of the reach, so that here the reach is above
+/// 2^-40, and what t loses, 2^-149 over the sum, below 2^-29 of that.
+inline constexpr float smallest_sum = 8.2718061e-25F;  // 2^-80
 
 /// Intersector::single_precision: Woop, Benthin, Wald 2013, with Kahan's difference of products in
 /// the place of their fallback to double; that is asked only where single precision underflows.
 class SinglePrecision {
  public:
   using Candidate = core::Candidate;
-  static constexpr float slab_units = 30.0F;  // 4, and 24 for a hit ("Single precision")
+  static constexpr float hit_distance = 26.0F * 0x1p-24F;  // 24, and room for roundings
   static constexpr double plane_margin = 0x1p-15;
 
   ZKD_HOST_DEVICE SinglePrecision(const PreparedRay& ray, const Ray&) : ray_(ray) {}
@@ -58,7 +60,7 @@ class SinglePrecision {
 class Fast {
  public:
   using Candidate = core::Candidate;
-  static constexpr float slab_units = 32.0F;  // 4, and 26 for a hit ("Fast")
+  static constexpr float hit_distance = 28.0F * 0x1p-24F;  // 26, and room for roundings
   static constexpr double plane_margin = 0x1p-15;
 
   ZKD_HOST_DEVICE Fast(const PreparedRay& ray, const Ray&) : ray_(ray) {}

@@ -25,6 +25,10 @@ struct Entries {
   std::uint32_t hit;  ///< bit 0: child 0, bit 1: child 1
 };
 
+/// Moves where a ray enters a box down, and where it leaves it up, by more than the test rounded
+/// them: 4 units of 2^-24 of each ("Boxes" in docs/accuracy.md).
+inline constexpr float box_slack = 1.0F / 2097152.0F;  // 2^-21
+
 /// A ray against the two boxes of a node. A backend may bring its own, and its own way to read a
 /// node.
 class BoxTest {
@@ -48,8 +52,12 @@ class BoxTest {
             far[child], (Real(at_far[child]) - ray_.origin[a]) * ray_.inverse[a] + ray_.padding[a]);
       }
     }
+    const auto meets = [](Real enters, Real leaves) {
+      return enters - Real(box_slack) * magnitude(enters) <=
+             leaves + Real(box_slack) * magnitude(leaves);
+    };
     return {{near[0].value, near[1].value},
-            (near[0] <= far[0] ? 1u : 0u) | (near[1] <= far[1] ? 2u : 0u)};
+            (meets(near[0], far[0]) ? 1u : 0u) | (meets(near[1], far[1]) ? 2u : 0u)};
   }
 
  private:
@@ -122,7 +130,7 @@ template <bool any, class Boxes, class Intersect>
 ZKD_HOST_DEVICE inline typename Intersect::Candidate trace(const TreeView& tree,
                                                            const TriangleView& triangles,
                                                            const Ray& ray, TraversalCost* cost) {
-  const PreparedRay prepared(tree, ray, Intersect::slab_units);
+  const PreparedRay prepared(tree, ray, Intersect::hit_distance);
   if (prepared.valid) {
     const Intersect intersect(prepared, ray);
     return traverse<any, Boxes>(tree, triangles, prepared, intersect, cost);
@@ -136,7 +144,7 @@ ZKD_HOST_DEVICE inline typename Intersect::Candidate trace(const TreeView& tree,
 template <class Intersect>
 ZKD_HOST_DEVICE inline typename Intersect::Candidate trace_brute_force(
     const TreeView& tree, const TriangleView& triangles, const Ray& ray) {
-  const PreparedRay prepared(tree, ray, Intersect::slab_units);
+  const PreparedRay prepared(tree, ray, Intersect::hit_distance);
   const Intersect intersect(prepared, ray);
   typename Intersect::Candidate best;
   for (std::uint32_t id = 0; prepared.valid && id < triangles.triangle_count; ++id) {
