@@ -21,7 +21,9 @@ class Avx2BoxTest {
       : first_(_mm_set1_ps(ray.first.value)) {
     for (std::uint32_t a = 0; a < 3; ++a) {
       origin_[a] = _mm_set1_ps(ray.origin[a].value);
-      inverse_[a] = _mm_set1_ps(ray.inverse[a].value);
+      const float leaving = (ray.inverse[a] * ray.far_slack).value;
+      const float inverse = ray.inverse[a].value;
+      inverse_[a] = _mm_setr_ps(inverse, inverse, leaving, leaving);
       const float p = ray.padding[a].value;
       padding_[a] = _mm_setr_ps(-p, -p, p, p);
       // Lanes of Node::bounds in the order near, near, far, far.
@@ -40,12 +42,7 @@ class Avx2BoxTest {
     const __m128 near = _mm_max_ps(_mm_max_ps(t[0], t[1]), _mm_max_ps(t[2], first_));
     const __m128 far =
         _mm_min_ps(_mm_min_ps(t[0], t[1]), _mm_min_ps(t[2], _mm_set1_ps(last.value)));
-    const __m128 ends = _mm_blend_ps(near, far, 0b1100);
-    const __m128 size = _mm_andnot_ps(_mm_set1_ps(-0.0F), ends);
-    const __m128 slack =
-        _mm_setr_ps(-core::box_slack, -core::box_slack, core::box_slack, core::box_slack);
-    const __m128 moved = _mm_fmadd_ps(size, slack, ends);
-    const int hit = _mm_movemask_ps(_mm_cmple_ps(moved, _mm_movehl_ps(moved, moved)));
+    const int hit = _mm_movemask_ps(_mm_cmple_ps(near, _mm_movehl_ps(far, far)));
     core::Entries entries;
     _mm_storel_pi(reinterpret_cast<__m64*>(entries.t), near);
     entries.hit = static_cast<std::uint32_t>(hit) & 3u;

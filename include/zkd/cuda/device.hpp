@@ -72,8 +72,9 @@ class FusedBoxTest {
   }
 
   ZKD_HOST_DEVICE Entries operator()(const Node& node, Real last) const {
+    constexpr float largest = 3.4028234663852886e38F;
     float near[2] = {ray_.first.value, ray_.first.value};
-    float far[2] = {last.value, last.value};
+    float far[2] = {largest, largest};
     for (std::uint32_t a = 0; a < 3; ++a) {
       const bool negative = ray_.is_negative(a);
       for (int child = 0; child < 2; ++child) {
@@ -85,12 +86,8 @@ class FusedBoxTest {
         far[child] = least(far[child], fma(to_far, ray_.inverse[a], ray_.padding[a]).value);
       }
     }
-    const auto meets = [](Real enters, Real leaves) {
-      return fma(magnitude(enters), Real(-box_slack), enters) <=
-             fma(magnitude(leaves), Real(box_slack), leaves);
-    };
-    return {{near[0], near[1]},
-            (meets(near[0], far[0]) ? 1u : 0u) | (meets(near[1], far[1]) ? 2u : 0u)};
+    for (float& leaving : far) leaving = least((Real(leaving) * ray_.far_slack).value, last.value);
+    return {{near[0], near[1]}, (near[0] <= far[0] ? 1u : 0u) | (near[1] <= far[1] ? 2u : 0u)};
   }
 
  private:

@@ -33,7 +33,7 @@ struct Crossing {
 };
 
 /// What lies behind a hit at t for certain: t moved by more than rounding it to float took, and
-/// the test of a box (box_slack).
+/// rounding where the ray enters a box.
 ZKD_HOST_DEVICE inline Real limit_behind(Wide t) {
   constexpr float slack = 1.0F / 2097152.0F;  // 2^-21
   const Real rounded = static_cast<float>(t.value);

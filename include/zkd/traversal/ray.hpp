@@ -22,6 +22,7 @@ struct PreparedRay {
   Real origin[3];
   Real inverse[3];          ///< of the direction; large instead of infinite
   Real padding[3];          ///< how far from a plane a hit may lie, in units of t
+  Real far_slack;           ///< where a ray leaves a box is taken to be so many times as far
   Real shear[3];            ///< direction[kx] / direction[kz], [ky] / [kz]; 1 / direction[kz]
   Real permuted_origin[3];  ///< origin in the order kx, ky, kz
   Real permuted_rest[3];    ///< what rounding a moved origin to float took off it
@@ -90,10 +91,16 @@ struct PreparedRay {
       const Real hi = static_cast<float>(high[a].value);
       reach = larger(reach, larger(magnitude(lo - origin[a]), magnitude(hi - origin[a])));
     }
+    // A box test rounds where the ray enters and leaves by 4 units of 2^-24 each. Where no hit lies
+    // behind the origin, that is a part of t: 16 units on the far side cover it. Else it is a part
+    // of the reach, and padding. Boxes are tested from a moved origin that was rounded to float,
+    // triangles are not.
     constexpr float unit = 1.0F / 16777216.0F;
-    // Boxes are tested from a moved origin that was rounded to float, the intersector's is not.
-    const Real rounding = moved ? Real(2.0F * unit) * furthest : Real(0.0F);
-    const Real half_width = Real(hit_distance) * reach + rounding;
+    const bool ahead = !moved && !(t_min < 0.0F);
+    far_slack = ahead ? 1.0F + 16.0F * unit : 1.0F;
+    Real half_width = Real(hit_distance) * reach;
+    if (!ahead) half_width = half_width + Real(5.0F * unit) * reach;
+    if (moved) half_width = half_width + Real(2.0F * unit) * furthest;
 
     Real d[3];
     for (int a = 0; a < 3; ++a) {

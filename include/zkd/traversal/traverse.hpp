@@ -25,10 +25,6 @@ struct Entries {
   std::uint32_t hit;  ///< bit 0: child 0, bit 1: child 1
 };
 
-/// Moves where a ray enters a box down, and where it leaves it up, by more than the test rounded
-/// them: 4 units of 2^-24 of each ("Boxes" in docs/accuracy.md).
-inline constexpr float box_slack = 1.0F / 2097152.0F;  // 2^-21
-
 /// A ray against the two boxes of a node. A backend may bring its own, and its own way to read a
 /// node.
 class BoxTest {
@@ -40,7 +36,8 @@ class BoxTest {
   /// `last`: nothing behind it is of interest any more.
   ZKD_HOST_DEVICE Entries operator()(const Node& node, Real last) const {
     Real near[2] = {ray_.first, ray_.first};
-    Real far[2] = {last, last};
+    constexpr float largest = 3.4028234663852886e38F;
+    Real far[2] = {largest, largest};
     for (std::uint32_t a = 0; a < 3; ++a) {
       const float* at_near = node.bounds[a] + (ray_.is_negative(a) ? 2 : 0);
       const float* at_far = node.bounds[a] + (ray_.is_negative(a) ? 0 : 2);
@@ -52,12 +49,9 @@ class BoxTest {
             far[child], (Real(at_far[child]) - ray_.origin[a]) * ray_.inverse[a] + ray_.padding[a]);
       }
     }
-    const auto meets = [](Real enters, Real leaves) {
-      return enters - Real(box_slack) * magnitude(enters) <=
-             leaves + Real(box_slack) * magnitude(leaves);
-    };
+    for (Real& leaving : far) leaving = smaller(leaving * ray_.far_slack, last);
     return {{near[0].value, near[1].value},
-            (meets(near[0], far[0]) ? 1u : 0u) | (meets(near[1], far[1]) ? 2u : 0u)};
+            (near[0] <= far[0] ? 1u : 0u) | (near[1] <= far[1] ? 2u : 0u)};
   }
 
  private:
