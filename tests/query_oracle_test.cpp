@@ -48,14 +48,7 @@ BuildOptions options_for(References references) {
 
 std::vector<Ray> rays_for(const test::NamedMesh& m, const test::PlatformTree& tree,
                           std::uint32_t count, std::uint64_t seed) {
-  std::vector<Ray> rays = test::RayMaker(m.mesh, tree.host().view(), seed).all_kinds(count);
-  for (const std::vector<Ray>& more :
-       {scene::random_rays(tree.host().view().bounds(), count / 4, seed),
-        scene::rays_at_features(m.mesh, count / 4, seed),
-        scene::axis_rays(m.mesh, count / 4, seed)}) {
-    rays.insert(rays.end(), more.begin(), more.end());
-  }
-  return rays;
+  return scene::hard_rays(m.mesh, tree.host().view(), count, seed);
 }
 
 void report(const std::string& name, const verify::Summary& total) {

@@ -66,15 +66,6 @@ double power_of_two(int exponent) {
   return result;
 }
 
-/// `steps` floats up or down from a finite x, through zero, as integers count them.
-float ulps_away(float x, int steps) {
-  const auto bits = std::bit_cast<std::int32_t>(x);
-  const std::int64_t order = bits >= 0 ? bits : -std::int64_t{bits & 0x7FFFFFFF};
-  const std::int64_t moved = order + steps;
-  const auto magnitude = static_cast<std::uint32_t>(moved >= 0 ? moved : -moved);
-  return std::bit_cast<float>(magnitude | (moved < 0 ? 0x80000000u : 0u));
-}
-
 /// The unit cube for an empty box; otherwise the box grown to twice its size round its centre.
 Box surroundings(const Box& box, bool grown) {
   Box result{{0.0F, 0.0F, 0.0F}, {1.0F, 1.0F, 1.0F}};
@@ -436,7 +427,7 @@ std::vector<Ray> rays_at_features(const Mesh& mesh, std::uint32_t n, std::uint64
           target[axis] = a[axis] + along + across;
           break;
         default:
-          target[axis] = ulps_away(a[axis], ((signs >> axis) & 1u) != 0 ? steps : -steps);
+          target[axis] = ulps(a[axis], ((signs >> axis) & 1u) != 0 ? steps : -steps);
           break;
       }
     }
@@ -467,7 +458,7 @@ std::vector<Ray> axis_rays(const Mesh& mesh, std::uint32_t n, std::uint64_t seed
       ray.direction[a] = (chance & 1u) != 0 ? -0.0F : 0.0F;
       // Half of the rays pass the vertex by one float.
       if (random.below(4) == 0) {
-        ray.origin[a] = ulps_away(ray.origin[a], (chance & 2u) != 0 ? 1 : -1);
+        ray.origin[a] = ulps(ray.origin[a], (chance & 2u) != 0 ? 1 : -1);
       }
     }
   }

@@ -3,7 +3,11 @@
 // Random numbers that are the same everywhere: integers only, no libm, no std distributions.
 #pragma once
 
+#include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstdint>
+
 #include <glm/ext/vector_float3.hpp>
 
 namespace zkd::scene {
@@ -44,8 +48,39 @@ class Random {
     return {x, y, z};
   }
 
+  /// lo .. hi, both included.
+  int integer(int lo, int hi) noexcept {
+    return lo + static_cast<int>(below(static_cast<std::uint32_t>(hi - lo + 1)));
+  }
+
+  bool one_in(std::uint32_t count) noexcept { return below(count) == 0; }
+
+  /// A multiple of 2^-23 in [-1, 1).
+  float signed_unit() noexcept { return 2.0F * unit() - 1.0F; }
+
+  glm::vec3 in_cube() noexcept { return point(-1.0F, 1.0F); }
+
+  /// Any finite float, all bit patterns alike: denormals, both zeros, both signs, 1e38.
+  float any_finite() noexcept {
+    for (;;) {
+      const auto x = std::bit_cast<float>(bits32());
+      if (std::isfinite(x)) return x;
+    }
+  }
+
  private:
   std::uint64_t state_;
 };
+
+/// The float `steps` representable values above (below, if negative) x, both zeros being one;
+/// infinity where there are no more. x must not be NaN.
+[[nodiscard]] inline float ulps(float x, int steps) noexcept {
+  constexpr std::int64_t infinite = 0x7F800000;
+  const auto bits = std::bit_cast<std::int32_t>(x);
+  const std::int64_t order = bits >= 0 ? bits : -std::int64_t{bits & 0x7FFFFFFF};
+  const std::int64_t moved = std::clamp(order + steps, -infinite, infinite);
+  const auto magnitude = static_cast<std::uint32_t>(moved >= 0 ? moved : -moved);
+  return std::bit_cast<float>(magnitude | (moved < 0 ? 0x80000000u : 0u));
+}
 
 }  // namespace zkd::scene
