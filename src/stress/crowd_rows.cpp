@@ -23,7 +23,7 @@ using scene::Random;
 constexpr double crowd_build_limit = 3.0;
 
 // Tests of rays against every triangle of a crowd: few rays are enough.
-std::uint32_t crowd_rays(const Setting& setting) { return setting.pick(600u, 400u); }
+std::uint32_t crowd_rays(const Setting& setting) { return setting.pick(600u, 100u); }
 
 void identical(const Setting& setting, const Yield& yield) {
   Case made = hard_case("identical", scene::identical(setting.pick(4000u, 1000000u)),

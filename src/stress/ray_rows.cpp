@@ -51,7 +51,7 @@ void at_meshes(const Setting& setting, const Yield& yield,
     Case made = hard_case(mesh.name, std::move(mesh.mesh), some_options(setting),
                           setting.pick(small_count, large_count));
     made.rays = each(make);
-    made.oracle_rays = setting.pick(0u, 10000u);
+    made.oracle_rays = setting.pick(0u, 3000u);
     yield(std::move(made));
   }
 }
@@ -94,9 +94,9 @@ void from_inside(const Setting& setting, const Yield& yield,
                  const std::function<glm::vec3(RayMaker&)>& target) {
   for (Closed& surface : closed_surfaces(setting)) {
     Case made = hard_case(surface.name, std::move(surface.mesh), once_and_all(),
-                          setting.pick(2000u, 400000u));
+                          setting.pick(2000u, 200000u));
     made.hits = Case::Hits::all;
-    made.oracle_rays = setting.pick(0u, 20000u);
+    made.oracle_rays = setting.pick(0u, 3000u);
     made.rays = each([target, centre = surface.centre, clear = surface.clear](RayMaker& maker) {
       const glm::vec3 from = centre + clear * 0.5F * maker.random().in_cube();
       return ray_between(from, target(maker));
@@ -203,7 +203,7 @@ void from_afar(const Setting& setting, const Yield& yield) {
     Case made =
         hard_case(mesh.name, std::move(mesh.mesh), once_and_all(), setting.pick(4000u, 100000u));
     made.rays = far_and_near;
-    made.oracle_rays = setting.pick(0u, 20000u);
+    made.oracle_rays = setting.pick(0u, 3000u);
     made.also = [](const Traced& traced, Findings& findings) {
       std::uint64_t far = 0;
       std::uint64_t near = 0;
@@ -256,7 +256,7 @@ void grazing(const Setting& setting, const Yield& yield) {
       Case made =
           hard_case(mesh.name + ", tangent " + std::to_string(tangent), std::move(mesh.mesh),
                     some_options(setting), setting.pick(1200u, 50000u));
-      made.oracle_rays = setting.pick(0u, 20000u);
+      made.oracle_rays = setting.pick(0u, 3000u);
       made.rays = [tangent](const Mesh& of, const TreeView& tree, std::uint32_t count,
                             std::uint64_t seed) {
         RayMaker maker(of, tree, seed);

@@ -91,7 +91,7 @@ void origins_on_surfaces(const Setting& setting, const Yield& yield) {
     Case made = hard_case(mesh.name, std::move(mesh.mesh), some_options(setting),
                           setting.pick(1800u, 100000u));
     made.rays = from_surfaces;
-    made.oracle_rays = setting.pick(0u, 20000u);
+    made.oracle_rays = setting.pick(0u, 3000u);
     made.also = [](const Traced& traced, Findings& findings) {
       std::uint64_t at_zero = 0;
       for (std::size_t i = 0; i + 1 < traced.rays.size(); i += 2) {
@@ -111,10 +111,86 @@ void origins_on_surfaces(const Setting& setting, const Yield& yield) {
 
 // ---- 42: spawned rays ---------------------------------------------------------------------------
 
-void spawned_rays(const Setting&, const Yield& yield) {
-  yield(own_case("spawned rays", [](const Setting&, Findings& findings) {
-    findings.skip("offset_origin is not in this version");
-  }));
+// Any direction; towards another vertex of the scene; along an axis; or nearly in the plane.
+glm::vec3 spawned_direction(RayMaker& maker, const Mesh& mesh, const Hit& from,
+                            const glm::vec3& origin) {
+  Random& random = maker.random();
+  const glm::uvec3& face = mesh.faces[from.triangle];
+  const glm::vec3 e = mesh.positions[face.y] - mesh.positions[face.x];
+  const glm::vec3 f = mesh.positions[face.z] - mesh.positions[face.x];
+  glm::vec3 direction{0.0F};
+  switch (random.below(4)) {
+    case 0:
+      direction = maker.size() * random.in_cube();
+      break;
+    case 1:
+      direction = maker.vertex() - origin;
+      break;
+    case 2:
+      direction[random.integer(0, 2)] = random.one_in(2) ? maker.size() : -maker.size();
+      break;
+    default:
+      direction = random.signed_unit() * e + random.signed_unit() * f +
+                  (1e-6F * maker.size()) * random.in_cube();
+      break;
+  }
+  return direction;
+}
+
+// Rays that leave a surface do not meet the triangle they leave, by the same intersector. Each is
+// shot at that triangle alone, so that nothing in front hides a hit; the tree lends its scale.
+void spawn(const Traced& traced, Intersector intersector, std::size_t count, Findings& findings) {
+  const Mesh& mesh = traced.of.mesh;
+  const TreeView& tree = traced.trees[0]->view();
+  const TriangleView triangles = mesh.view();
+  std::vector<Hit> hits(traced.rays.size());
+  closest_hit(cpu::Executor{.threads = traced.threads}, tree, triangles, traced.rays, hits, {},
+              intersector);
+  std::erase_if(hits, [](const Hit& hit) { return !is_hit(hit); });
+  findings.expect(hits.size() > 20, "few hits to spawn rays from");
+  if (hits.empty()) return;
+  RayMaker maker(mesh, tree, 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Hit& from = hits[i % hits.size()];
+    const glm::vec3 at = mesh.positions[mesh.faces[from.triangle].x];
+    Ray ray;
+    ray.direction = spawned_direction(maker, mesh, from, at);
+    ray.origin = offset_origin(triangles, from, ray.direction, intersector);
+    TriangleView alone = triangles;
+    alone.indices += std::size_t{3} * from.triangle;
+    alone.triangle_count = 1;
+    Hit again;
+    closest_hit_brute_force(cpu::Executor{.threads = 1}, tree, alone, std::span(&ray, 1),
+                            std::span(&again, 1), intersector);
+    findings.expect(!is_hit(again), std::string(to_string(intersector)) + ": hits triangle " +
+                                        std::to_string(from.triangle) + " again: " + print(again) +
+                                        ", ray " + print(ray));
+  }
+  findings.rays += count;
+}
+
+void spawned_rays(const Setting& setting, const Yield& yield) {
+  std::vector<scene::NamedMesh> all = meshes(setting);
+  const std::uint32_t count = setting.pick(300u, 20000u);
+  all.push_back({"slivers", scene::slivers(count, 1e4F, setting.seed)});
+  all.push_back({"far soup", scene::offset(scene::soup(count, setting.seed), {148376, 1e6F, 0})});
+  all.push_back({"tiny sphere", scene::scaled(scene::sphere(3), -100)});
+  all.push_back({"huge sphere", scene::scaled(scene::sphere(3), 90)});
+  all.push_back({"many scales", scene::many_scales(count, setting.seed)});
+  for (scene::NamedMesh& mesh : all) {
+    Case made =
+        hard_case(mesh.name, std::move(mesh.mesh), once_and_all(), setting.pick(1200u, 20000u));
+    made.oracle_rays = setting.pick(0u, 1000u);
+    const std::size_t spawned = setting.pick(2000u, 120000u);
+    made.also = [spawned](const Traced& traced, Findings& findings) {
+      spawn(traced, Intersector::watertight, spawned, findings);
+      for (const Intersector other : {Intersector::fast, Intersector::single_precision,
+                                      Intersector::double_precision, Intersector::exact}) {
+        spawn(traced, other, spawned / 8, findings);
+      }
+    };
+    yield(std::move(made));
+  }
 }
 
 // ---- 43: ends -----------------------------------------------------------------------------------
@@ -123,7 +199,7 @@ void ends(const Setting& setting, const Yield& yield) {
   for (scene::NamedMesh& mesh : meshes(setting)) {
     Case made = hard_case(mesh.name, std::move(mesh.mesh), some_options(setting),
                           setting.pick(1200u, 40000u));
-    made.oracle_rays = setting.pick(0u, 10000u);
+    made.oracle_rays = setting.pick(0u, 3000u);
     made.also = [](const Traced& traced, Findings& findings) {
       enum End { max_at, max_before, min_at, min_behind, both_at, crossed, count };
       std::vector<Ray> cut;
@@ -202,7 +278,7 @@ void direction_lengths(const Setting& setting, const Yield& yield) {
     Case made = hard_case(mesh.name, std::move(mesh.mesh), some_options(setting),
                           setting.pick(5400u, 90000u));
     made.rays = of_all_lengths;
-    made.oracle_rays = setting.pick(0u, 20000u);
+    made.oracle_rays = setting.pick(0u, 3000u);
     made.also = [](const Traced& traced, Findings& findings) {
       for (std::size_t i = 0; i < traced.rays.size(); ++i) {
         const std::size_t first = i / lengths * lengths;

@@ -13,6 +13,7 @@
 #include <zkd/query.hpp>
 
 #include "scene/generate.hpp"
+#include "stress/intersectors.hpp"
 #include "verify/check.hpp"
 #include "verify/counting_resource.hpp"
 #include "verify/hits.hpp"
@@ -30,7 +31,7 @@ using verify::same_bits;
 
 // Work that grows with triangles times rays, and what is done once a triangle many times over, is
 // bounded by these.
-constexpr std::uint64_t most_brute_force_tests = 200'000'000;
+constexpr std::uint64_t most_brute_force_tests = 50'000'000;
 constexpr std::uint64_t most_oracle_tests = 40'000'000;
 constexpr std::size_t many_triangles = 100'000;
 
@@ -156,11 +157,14 @@ void check_brute_force(const Case& which, const Tree& tree, std::span<const Ray>
   const std::vector<Ray> some = at(rays, places);
   std::vector<Hit> want(some.size());
   closest_hit_brute_force(executor, tree.view(), which.mesh.view(), some, want);
-  compare(at(hits, places), want, some, "not brute force's", findings);
+  const std::vector<Hit> answers = at(hits, places);
+  compare(answers, want, some, "not brute force's", findings);
+  const std::span<const Ray> fewer = std::span(some).first((some.size() + 2) / 3);
+  check_rounding_intersectors(which, tree, fewer, answers, executor, findings);
 }
 
-void check_oracle(const Case& which, std::span<const Ray> rays, std::span<const Hit> hits,
-                  const cpu::Executor& executor, Findings& findings) {
+void check_oracle(const Case& which, const Tree& tree, std::span<const Ray> rays,
+                  std::span<const Hit> hits, const cpu::Executor& executor, Findings& findings) {
   const std::uint64_t triangles = std::max<std::size_t>(which.mesh.faces.size(), 1);
   const bool many = triangles * rays.size() > most_oracle_tests;
   const verify::Oracle oracle(which.mesh.view(), many ? verify::Oracle::Search::box_tree
@@ -180,6 +184,7 @@ void check_oracle(const Case& which, std::span<const Ray> rays, std::span<const 
     findings.fail(std::string("oracle: ") + verify::to_string(verdict.kind) + ", " +
                   print(answers[i]) + ", ray " + print(some[i]));
   }
+  check_exact_intersector(which, tree, oracle, some, executor, findings);
 }
 
 void check_hits(const Case& which, std::span<const Ray> rays, std::span<const Hit> hits,
@@ -287,7 +292,7 @@ void run_traced(const Case& which, const Setting& setting, Findings& findings) {
   findings.about(which.name);
   if (!rays.empty()) {
     check_brute_force(which, *trees[0], rays, hits, executor, findings);
-    check_oracle(which, rays, hits, executor, findings);
+    check_oracle(which, *trees[0], rays, hits, executor, findings);
     check_hits(which, rays, hits, findings);
     check_expense(which, *trees[0], rays, setting, findings);
   }

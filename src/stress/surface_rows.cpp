@@ -54,7 +54,7 @@ void fans(const Setting& setting, const Yield& yield) {
     yield(top_of_fan(triangles, setting));
     Case made = hard_case("all of " + std::to_string(triangles), scene::fan(triangles),
                           triangles > 100000 ? only_once() : some_options(setting),
-                          setting.pick(600u, 1000u));
+                          triangles > 10000 ? 100 : setting.pick(600u, 1000u));
     made.oracle_rays = few_where_many(triangles);
     yield(std::move(made));
   }
