@@ -16,6 +16,8 @@
 #include <zkd/config.hpp>
 #include <zkd/geometry.hpp>
 
+#include "command_line.hpp"
+
 namespace zkd::bench {
 namespace {
 
@@ -75,13 +77,6 @@ bool on_or_off(const std::string& option, const std::string& value) {
   if (value == "on") return true;
   if (value == "off") return false;
   throw UsageError(option + ": '" + value + "' is not one of on, off");
-}
-
-// CLI11 says some things on several lines; scripts want one.
-std::string one_line(std::string text) {
-  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
 }
 
 // What distinguishes a setting: its values on the options that were given more than one.
@@ -182,18 +177,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   };
   const auto number = [&](const char* group, const char* name, std::int64_t& value,
                           const std::string& help, std::int64_t lowest, std::int64_t highest) {
-    app.add_option(name, value, help)
-        ->group(group)
-        ->type_name("N")
-        ->capture_default_str()
-        ->check([lowest, highest](const std::string& given) {
-          std::int64_t read = 0;
-          if (CLI::detail::lexical_cast(given, read) && read >= lowest && read <= highest) {
-            return std::string();
-          }
-          return "'" + given + "' is not a whole number from " + std::to_string(lowest) + " to " +
-                 std::to_string(highest);
-        });
+    add_whole_number(app, name, value, help, lowest, highest)->group(group);
   };
 
   const char* build = "Build";

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -14,14 +13,9 @@
 #include <zkd/options.hpp>
 
 #include "results.hpp"
+#include "usage_error.hpp"
 
 namespace zkd::bench {
-
-/// A command line that makes no sense. One line that names the option.
-class UsageError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// Other libraries that can be timed in the same run.
 enum class PeerLibrary { embree };

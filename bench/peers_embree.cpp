@@ -372,6 +372,11 @@ class Embree final : public EmbreeContender {
     return timing;
   }
 
+  void closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
+    for_each_batch<Hit>(threads_, scene_, false, rays, hits, trace_closest);
+    device_->require_no_error("tracing");
+  }
+
   void clear() override { release(); }
 
   [[nodiscard]] Memory memory() const override { return memory_; }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ class EmbreeContender : public Contender {
     std::uint64_t held = 0;
     std::uint64_t peak = 0;
   };
+
+  /// Nearest hit of each ray, one ray at a time, as trace() does for all kinds but shadow rays.
+  virtual void closest_hit(std::span<const Ray> rays, std::span<Hit> hits) = 0;
 
   /// Of the last build().
   [[nodiscard]] virtual Memory memory() const = 0;
