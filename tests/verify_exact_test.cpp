@@ -181,4 +181,19 @@ TEST(VerifyExact, PlaneHitIsTheNearestDouble) {
 }
 
 }  // namespace
+// Corners a, b, c are at 1 along x, y, z: a ray from 0 meets their plane at its own shares.
+TEST(VerifyExact, BarycentricsAreTheNearestDoubles) {
+  const Corners unit = {Point{1, 0, 0}, Point{0, 1, 0}, Point{0, 0, 1}};
+  const Barycentrics thirds = barycentrics({0, 0, 0}, {1, 1, 1}, unit);
+  EXPECT_EQ(thirds.u, 1.0 / 3.0);
+  EXPECT_EQ(thirds.v, 1.0 / 3.0);
+  const Barycentrics sevenths = barycentrics({0, 0, 0}, {-1, -2, -4}, unit);
+  EXPECT_EQ(sevenths.u, 2.0 / 7.0);
+  EXPECT_EQ(sevenths.v, 4.0 / 7.0);
+  const Barycentrics outside = barycentrics({2, 2, -1}, {0, 0, 1}, unit);  // meets it at z = -3
+  EXPECT_EQ(outside.u, 2.0);
+  EXPECT_EQ(outside.v, -3.0);
+  EXPECT_TRUE(std::isnan(barycentrics({0, 0, 0}, {1, -1, 0}, unit).u));
+}
+
 }  // namespace zkd::verify

@@ -238,4 +238,26 @@ PlaneHit plane_hit(const Point& o, const Point& d, const Corners& corners) {
   return result;
 }
 
+Barycentrics barycentrics(const Point& o, const Point& d, const Corners& corners) {
+  const int exponent = common_exponent({o, corners[0], corners[1], corners[2]});
+  const IntegerPoint origin(o, exponent);
+  const IntegerPoint direction(d, common_exponent({d}));
+  const IntegerPoint a = IntegerPoint(corners[0], exponent) - origin;
+  const IntegerPoint b = IntegerPoint(corners[1], exponent) - origin;
+  const IntegerPoint c = IntegerPoint(corners[2], exponent) - origin;
+  // The edge opposite a corner has that corner's weight; the three weights add up to d . n.
+  const mpz_class of_a = dot(direction, cross(b, c));
+  const mpz_class of_b = dot(direction, cross(c, a));
+  const mpz_class of_c = dot(direction, cross(a, b));
+  const mpz_class sum = of_a + of_b + of_c;
+  if (sgn(sum) == 0) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    return {nan, nan};
+  }
+  const auto share = [&](const mpz_class& weight) {
+    return sgn(sum) < 0 ? nearest_double({-weight, -sum, 0}) : nearest_double({weight, sum, 0});
+  };
+  return {share(of_b), share(of_c)};
+}
+
 }  // namespace zkd::verify

@@ -94,4 +94,13 @@ struct PlaneHit {
 /// Computed in integers and rounded once.
 [[nodiscard]] PlaneHit plane_hit(const Point& o, const Point& d, const Corners& corners);
 
+/// Where the line o + t * d meets the plane of (a, b, c): at (1 - u - v) * a + u * b + v * c.
+struct Barycentrics {
+  double u;  ///< to the nearest double; NaN where d . n is zero
+  double v;
+};
+
+/// Computed in integers and rounded once.
+[[nodiscard]] Barycentrics barycentrics(const Point& o, const Point& d, const Corners& corners);
+
 }  // namespace zkd::verify

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Cases by number: each thread makes, builds and traces whole cases of its own.
+#include "brute_force.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+
+#include <zkd/build.hpp>
+#include <zkd/query.hpp>
+
+#include "scene/progress.hpp"
+#include "scene/random.hpp"
+#include "support/meshes.hpp"
+#include "support/rays.hpp"
+
+namespace zkd::bench::accuracy {
+namespace {
+
+constexpr std::uint32_t rays_a_case = 1024;
+
+bool same_bits(const Hit& a, const Hit& b) {
+  return std::bit_cast<std::uint32_t>(a.t) == std::bit_cast<std::uint32_t>(b.t) &&
+         std::bit_cast<std::uint32_t>(a.u) == std::bit_cast<std::uint32_t>(b.u) &&
+         std::bit_cast<std::uint32_t>(a.v) == std::bit_cast<std::uint32_t>(b.v) &&
+         a.triangle == b.triangle;
+}
+
+// Options that decide the tree, by the dice of the case; every other case is `all`.
+BuildOptions options_of(std::uint64_t number, scene::Random& random) {
+  constexpr std::uint32_t leaf_sizes[] = {1, 2, 4, 8, 16};
+  constexpr std::uint32_t widths[] = {0, 15, 32, 48, 64};
+  BuildOptions options;
+  options.invalid_triangles = InvalidTriangles::skip;
+  options.references = number % 2 == 0 ? References::once : References::all;
+  options.leaf_size = leaf_sizes[random.below(5)];
+  options.code_bits = widths[random.below(5)];
+  options.axis_order = random.below(4) == 0 ? AxisOrder::cyclic : AxisOrder::by_extent;
+  options.recode_crowded = random.below(4) != 0;
+  return options;
+}
+
+std::string describe(const std::string& mesh, std::uint64_t case_number,
+                     const BuildOptions& options, std::size_t ray) {
+  return mesh + ", case " + std::to_string(case_number) + ", references " +
+         zkd::to_string(options.references) + ", leaf size " + std::to_string(options.leaf_size) +
+         ", code bits " + std::to_string(options.code_bits) + ", ray " + std::to_string(ray);
+}
+
+struct CaseResult {
+  TreeAgainstLoop counts;
+  std::string first_difference;
+};
+
+CaseResult compare_case(std::uint64_t number, std::uint64_t seed) {
+  const auto kind = static_cast<int>(number / 2 % test::small_mesh_kinds);
+  const std::uint64_t variation = number / (2 * test::small_mesh_kinds);
+  scene::Random random(seed ^ (number * 0x9E3779B97F4A7C15u));
+  const test::NamedMesh named = test::small_mesh(kind, seed + variation);
+  const TriangleView triangles = named.mesh.view();
+  const BuildOptions options = options_of(number, random);
+
+  cpu::Executor executor;
+  executor.threads = 1;
+  const Tree tree = zkd::build(executor, triangles, options);
+  const std::vector<Ray> rays =
+      test::RayMaker(named.mesh, tree.view(), random.bits64()).all_kinds(rays_a_case);
+  std::vector<Hit> by_tree(rays.size());
+  std::vector<Hit> by_loop(rays.size());
+  std::vector<std::uint8_t> occluded(rays.size());
+  zkd::closest_hit(executor, tree.view(), triangles, rays, by_tree);
+  zkd::closest_hit_brute_force(executor, tree.view(), triangles, rays, by_loop);
+  zkd::any_hit(executor, tree.view(), triangles, rays, occluded);
+
+  CaseResult result;
+  result.counts.rays = rays.size();
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const bool different = !same_bits(by_tree[i], by_loop[i]);
+    const bool any_different = (occluded[i] != 0) != (by_tree[i].triangle != no_triangle);
+    if ((different || any_different) && result.first_difference.empty()) {
+      result.first_difference = describe(named.name, number, options, i);
+    }
+    result.counts.different += different ? 1 : 0;
+    result.counts.any_hit_different += any_different ? 1 : 0;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::uint64_t TreeAgainstLoops::rays() const {
+  std::uint64_t sum = 0;
+  for (const TreeAgainstLoop& one : of_intersector) sum += one.rays;
+  return sum;
+}
+
+std::uint64_t TreeAgainstLoops::different() const {
+  std::uint64_t sum = 0;
+  for (const TreeAgainstLoop& one : of_intersector) sum += one.different + one.any_hit_different;
+  return sum;
+}
+
+TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed, int threads) {
+  TreeAgainstLoops all;
+  all.of_intersector.push_back({"watertight"});
+  all.cases = (rays + rays_a_case - 1) / rays_a_case;
+  scene::Progress progress("tree against brute force", all.cases);
+  std::uint64_t first_case = all.cases;
+#pragma omp parallel for num_threads(threads) schedule(dynamic)
+  for (std::uint64_t number = 0; number < all.cases; ++number) {
+    const CaseResult result = compare_case(number, seed);
+#pragma omp critical(zkd_accuracy_brute_force)
+    {
+      TreeAgainstLoop& sum = all.of_intersector.front();
+      sum.rays += result.counts.rays;
+      sum.different += result.counts.different;
+      sum.any_hit_different += result.counts.any_hit_different;
+      if (!result.first_difference.empty() && number < first_case) {
+        first_case = number;
+        all.first_difference = result.first_difference;
+      }
+    }
+    progress.advance(1);
+  }
+  return all;
+}
+
+}  // namespace zkd::bench::accuracy

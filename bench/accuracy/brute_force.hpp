@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// E3: the tree never changes an answer. Tree against a loop over all triangles, bit by bit, on many
+// small meshes and rays that are hard on purpose.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace zkd::bench::accuracy {
+
+struct TreeAgainstLoop {
+  std::string intersector;
+  std::uint64_t rays = 0;
+  std::uint64_t different = 0;          ///< closest_hit: any bit of the answer
+  std::uint64_t any_hit_different = 0;  ///< any_hit is not (closest_hit found something)
+};
+
+struct TreeAgainstLoops {
+  std::uint64_t cases = 0;  ///< trees: a mesh and build options
+  std::vector<TreeAgainstLoop> of_intersector;
+  std::string first_difference;  ///< mesh, options and ray of the first; empty if there is none
+
+  [[nodiscard]] std::uint64_t rays() const;
+  [[nodiscard]] std::uint64_t different() const;
+};
+
+/// About `rays` rays, spread over the small meshes of the tests (some 300 triangles each, one of
+/// every kind that was ever hard), `once` and `all`, leaf sizes, code widths and axis orders.
+[[nodiscard]] TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed,
+                                                        int threads);
+
+}  // namespace zkd::bench::accuracy

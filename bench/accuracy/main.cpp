@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// zkd-accuracy: from a command line to tables, JSON, plots and an exit status.
+#include <omp.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <new>
+#include <string>
+
+#include <zkd/error.hpp>
+
+#include "machine.hpp"
+#include "options.hpp"
+#include "pictures.hpp"
+#include "report.hpp"
+#include "scene/catalog.hpp"
+#include "scene/load.hpp"
+#include "scenes.hpp"
+#include "verify/oracle.hpp"
+
+namespace zkd::bench::accuracy {
+namespace {
+
+enum ExitStatus { done = 0, check_failed = 1, bad_input = 2, device_failure = 3 };
+
+int fail(ExitStatus status, std::string message) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cerr << "zkd-accuracy: error: " << message << std::endl;
+  return status;
+}
+
+ExitStatus status_of(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::out_of_memory:
+    case ErrorCode::backend_unavailable:
+    case ErrorCode::device_failure:
+      return device_failure;
+    default:
+      return bad_input;
+  }
+}
+
+std::vector<TestScene> load_scenes(const Options& options) {
+  std::vector<scene::SceneInfo> infos;
+  if (options.scenes.empty()) {
+    infos = scene::paper_scenes();
+    if (options.first_scene_only && infos.size() > 1) infos.resize(1);
+  }
+  for (const std::string& name : options.scenes) infos.push_back(scene::find_scene(name));
+  std::vector<TestScene> scenes;
+  for (const scene::SceneInfo& info : infos) {
+    TestScene loaded{info.name, info.stand_in, false, scene::load_mesh(info.path), {}};
+    loaded.camera = info.camera ? *info.camera : scene::fit_camera(scene::bounds(loaded.mesh));
+    scenes.push_back(std::move(loaded));
+  }
+  if (options.stress > 0) {
+    for (TestScene& scene : stress_scenes(options.stress, options.seed)) {
+      scenes.push_back(std::move(scene));
+    }
+  }
+  return scenes;
+}
+
+// Exact answers are asked for here and nowhere else; they serve the curves, E1, E2, E4 and E6.
+void measure_scene(const TestScene& scene, const Options& options, const cpu::Executor& executor,
+                   Report& report) {
+  const verify::Oracle oracle(scene.mesh.view(), verify::Oracle::Search::box_tree);
+  const std::vector<RaySet> sets = ray_sets(scene, oracle, executor, options.size, options.seed);
+  for (const RaySet& set : sets) {
+    report.oracle.push_back({scene.name, set.kind, set.rays.size(), set.truth->oracle_seconds()});
+  }
+  if (options.measures.contains(Measure::curves)) {
+    CurveOptions curve_options;
+    curve_options.repeat = options.repeat;
+    curve_options.peers = options.peers;
+    const std::vector<Point> points = measure_curves(scene, sets, oracle, executor, curve_options);
+    report.add_errors(points);
+    report.points.insert(report.points.end(), points.begin(), points.end());
+  }
+  if (options.measures.contains(Measure::e6)) {
+    for (TreeQuality& quality : measure_quality(scene, sets, executor)) {
+      report.e6.push_back(std::move(quality));
+    }
+  }
+  if (options.plots) {
+    const unsigned size = std::clamp(options.size * 4, 128u, 1024u);
+    write_literal_errors(*options.plots, scene, oracle, size, executor);
+  }
+}
+
+void write(const std::filesystem::path& path, const std::string& option, const std::string& text) {
+  std::ofstream file(path, std::ios::trunc);
+  file << text << std::flush;
+  if (!file) throw UsageError(option + ": cannot write " + path.string());
+}
+
+void make_plots(const std::filesystem::path& folder) {
+  std::string program = ZKD_ACCURACY_PLOT;
+  std::string argument = folder.string();
+  char* arguments[] = {program.data(), argument.data(), nullptr};
+  pid_t child = 0;
+  if (posix_spawn(&child, program.c_str(), nullptr, nullptr, arguments, environ) != 0) {
+    throw UsageError("--plots: cannot run " + program);
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    throw UsageError("--plots: " + program +
+                     " failed (it needs matplotlib; Debian and Ubuntu: python3-matplotlib)");
+  }
+}
+
+int run(const Options& options) {
+  cpu::Executor executor;
+  executor.threads = options.threads > 0 ? options.threads : omp_get_max_threads();
+  Report report;
+  report.machine = describe_machine(executor.threads);
+
+  // Before anything is measured, so that a bad path costs no minutes.
+  const bool json_only = options.json && *options.json == "-";
+  if (options.json && !json_only) write(*options.json, "--json", to_json(report, options));
+  if (options.table) write_table(*options.table, "");
+  if (options.plots) {
+    std::error_code error;
+    std::filesystem::create_directories(*options.plots, error);
+    if (!std::filesystem::is_directory(*options.plots)) {
+      throw UsageError("--plots: cannot make the folder " + options.plots->string());
+    }
+  }
+
+  const std::vector<TestScene> scenes = load_scenes(options);
+  for (const TestScene& scene : scenes) report.scenes.push_back(scene.name);
+  const auto asked = [&](Measure measure) { return options.measures.contains(measure); };
+  if (asked(Measure::curves) || asked(Measure::e6) || options.plots) {
+    for (const TestScene& scene : scenes) measure_scene(scene, options, executor, report);
+  }
+  if (asked(Measure::e3)) {
+    report.e3 = compare_with_brute_force(options.brute_force, options.seed, executor.threads);
+  }
+  if (asked(Measure::e5)) {
+    report.e5 = count_leaks(scenes, options.leaks, options.seed, executor, options.peers);
+  }
+  if (asked(Measure::e7)) report.e7 = compare_hashes(scenes, options.meshes, options.seed);
+
+  const std::string json = to_json(report, options);
+  if (options.json && !json_only) write(*options.json, "--json", json);
+  if (options.table) write_table(*options.table, pareto_table(report));
+  if (options.plots) {
+    write_vertex_leaks(*options.plots, 256, options.seed, executor);
+    write(*options.plots / "results.json", "--plots", json);
+    make_plots(*options.plots);
+  }
+  if (json_only) {
+    std::cout << json << std::flush;
+    if (!std::cout) throw UsageError("--json: cannot write to standard output");
+  } else {
+    print(std::cout, report);
+  }
+  return report.failures().empty() ? done : check_failed;
+}
+
+}  // namespace
+}  // namespace zkd::bench::accuracy
+
+int main(int argc, char** argv) {
+  using namespace zkd::bench::accuracy;
+  try {
+    const std::optional<Options> options = parse_options(argc, argv);
+    return options ? run(*options) : done;
+  } catch (const zkd::Error& error) {
+    return fail(status_of(error.code()), error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(device_failure, "out of memory");
+  } catch (const std::exception& error) {
+    return fail(bad_input, error.what());
+  }
+}

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the measurements add up to.
+#include "report.hpp"
+
+#include <algorithm>
+
+namespace zkd::bench::accuracy {
+
+void Report::add_errors(const std::vector<Point>& of_scene) {
+  for (const Point& point : of_scene) {
+    if (point.family != "intersector" && !point.peer) continue;
+    const auto found = std::find_if(errors.begin(), errors.end(), [&](const ErrorsOf& one) {
+      return one.name == point.setting && one.rays == point.rays;
+    });
+    ErrorsOf& sum = found != errors.end() ? *found : errors.emplace_back();
+    sum.name = point.setting;
+    sum.rays = point.rays;
+    sum.peer = point.peer;
+    sum.score.add(point.score);
+  }
+}
+
+std::vector<std::string> Report::failures() const {
+  std::vector<std::string> found;
+  const auto count = [&](std::uint64_t number, const std::string& what) {
+    if (number > 0) found.push_back(std::to_string(number) + " " + what);
+  };
+  for (const ErrorsOf& one : errors) {
+    if (!one.peer) {
+      count(one.score.total().outside_band(),
+            one.name + " answers to " + one.rays + " rays outside the error band");
+    }
+  }
+  if (e3)
+    count(e3->different(), "differences between tree and brute force: " + e3->first_difference);
+  if (e5) {
+    for (const LeaksOf& one : e5->of) {
+      if (!one.peer) count(one.total().leaks, one.name + " leaks: " + one.first_leak);
+    }
+  }
+  if (e7) count(e7->hashes_too_many, "hashes too many: " + e7->first_offender);
+  return found;
+}
+
+}  // namespace zkd::bench::accuracy

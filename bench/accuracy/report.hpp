@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a run of zkd-accuracy found out: plain data between measuring and telling.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "brute_force.hpp"
+#include "curves.hpp"
+#include "leaks.hpp"
+#include "options.hpp"
+#include "results.hpp"
+#include "trees.hpp"
+
+namespace zkd::bench::accuracy {
+
+/// How fast the exact oracle answered one set of rays.
+struct OracleSpeed {
+  std::string scene;
+  std::string rays;  ///< kind
+  std::uint64_t count = 0;
+  double seconds = 0.0;  ///< of all threads together
+};
+
+/// E1, E2 and E4 of one intersector or peer, over all scenes.
+struct ErrorsOf {
+  std::string name;
+  std::string rays;  ///< "workload" or "adversarial"
+  bool peer = false;
+  Score score;
+};
+
+struct Report {
+  Machine machine;
+  std::vector<std::string> scenes;
+  std::vector<OracleSpeed> oracle;
+  std::vector<Point> points;
+  std::vector<ErrorsOf> errors;
+  std::optional<TreeAgainstLoops> e3;
+  std::optional<Leaks> e5;
+  std::vector<TreeQuality> e6;
+  std::optional<Determinism> e7;
+
+  /// The scores of `points` that are zkd as it comes or a peer, added to `errors`.
+  void add_errors(const std::vector<Point>& of_scene);
+
+  /// Why this run is a failure, in words; empty if every target is met.
+  [[nodiscard]] std::vector<std::string> failures() const;
+};
+
+/// The whole document, schema 1, indented, with a line end. What is unknown is null.
+[[nodiscard]] std::string to_json(const Report& report, const Options& options);
+
+/// For people: 100 columns, a summary line last.
+void print(std::ostream& out, const Report& report);
+
+/// The settings that no other beats in both run time and error, for each scene and group of rays;
+/// zkd as it comes, the literal tree and Embree always. Markdown.
+[[nodiscard]] std::string pareto_table(const Report& report);
+
+/// Writes `table` between the markers `<!-- table: begin -->` and `<!-- table: end -->` of a file
+/// that has them, or into a new file, with markers. Throws UsageError where neither can be.
+void write_table(const std::filesystem::path& file, const std::string& table);
+
+}  // namespace zkd::bench::accuracy

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The list of settings.
+#include "settings.hpp"
+
+namespace zkd::bench::accuracy {
+
+std::vector<Setting> all_settings() {
+  BuildOptions base;
+  base.invalid_triangles = InvalidTriangles::skip;
+  std::vector<Setting> settings;
+  const auto add = [&](const char* family, const std::string& name, const BuildOptions& build,
+                       Walk walk = Walk::library) {
+    settings.push_back({family, name, build, walk});
+  };
+
+  add("intersector", default_setting, base);
+  for (const References references : {References::once, References::all}) {
+    BuildOptions build = base;
+    build.references = references;
+    add("references", zkd::to_string(references), build);
+  }
+  for (const std::uint32_t bits : {32u, 64u}) {
+    BuildOptions build = base;
+    build.code_bits = bits;
+    add("codes", "codes " + std::to_string(bits), build);
+  }
+  // Three axes share the bits. Trunks are not coded again: that would hide how few bits there are.
+  for (std::uint32_t bits = 5; bits <= 21; ++bits) {
+    BuildOptions build = base;
+    build.code_bits = 3 * bits;
+    build.recode_crowded = false;
+    add("bits", "bits " + std::to_string(bits), build);
+  }
+  for (const std::uint32_t leaf_size : {1u, 2u, 4u, 8u, 16u, 32u}) {
+    BuildOptions build = base;
+    build.leaf_size = leaf_size;
+    add("leaf", "leaf " + std::to_string(leaf_size), build);
+  }
+  for (const References references : {References::once, References::all}) {
+    BuildOptions build = base;
+    build.references = references;
+    for (const Walk walk : {Walk::naive, Walk::padded, Walk::slab}) {
+      add("traversal", std::string(to_string(walk)) + " " + zkd::to_string(references), build,
+          walk);
+    }
+  }
+  add("literal", "literal", base, Walk::literal);
+  return settings;
+}
+
+}  // namespace zkd::bench::accuracy

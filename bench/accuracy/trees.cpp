@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Trees measured, and trees compared by their hashes.
+#include "trees.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include <zkd/build.hpp>
+#include <zkd/error.hpp>
+#include <zkd/query.hpp>
+
+#include "scene/generate.hpp"
+#include "scene/progress.hpp"
+#include "support/meshes.hpp"
+#include "verify/tree_hash.hpp"
+#include "walks.hpp"
+
+namespace zkd::bench::accuracy {
+namespace {
+
+constexpr int permutations = 2;
+
+BuildOptions options_with(References references) {
+  BuildOptions options;
+  options.references = references;
+  options.invalid_triangles = InvalidTriangles::skip;
+  return options;
+}
+
+class HashComparison {
+ public:
+  explicit HashComparison(std::uint64_t seed) : seed_(seed) { result_.backends = {"cpu"}; }
+
+  void compare(const std::string& name, const scene::Mesh& mesh, References references) {
+    const BuildOptions options = options_with(references);
+    std::set<std::string> hashes;
+    std::set<std::string> mapped;
+    for (const int threads : {1, 2, 3, 8}) {
+      for (const auto instructions : {cpu::InstructionSet::portable, cpu::InstructionSet::avx2}) {
+        cpu::Executor executor;
+        executor.threads = threads;
+        executor.instructions = instructions;
+        const Tree tree = zkd::build(executor, mesh.view(), options);
+        hashes.insert(verify::tree_hash(tree.view()));
+        if (hashes.size() == 1) mapped.insert(verify::tree_hash_mapped(tree.view(), {}));
+        ++result_.builds;
+      }
+    }
+    add_cuda(mesh, options, hashes);
+    for (int i = 0; i < permutations; ++i) {
+      std::vector<std::uint32_t> permutation;
+      const scene::Mesh shuffled =
+          scene::shuffled(mesh, seed_ + static_cast<std::uint64_t>(i), &permutation);
+      const Tree tree = zkd::build(cpu::Executor{}, shuffled.view(), options);
+      // Face i of the shuffled mesh is face permutation[i]: its id becomes that.
+      mapped.insert(verify::tree_hash_mapped(tree.view(), permutation));
+      ++result_.builds;
+    }
+    ++result_.cases;
+    const std::uint64_t too_many = hashes.size() - 1 + mapped.size() - 1;
+    if (too_many > 0 && result_.first_offender.empty()) {
+      result_.first_offender = name + ", references " + zkd::to_string(references);
+    }
+    result_.hashes_too_many += too_many;
+  }
+
+  [[nodiscard]] const Determinism& result() const { return result_; }
+
+ private:
+  void add_cuda(const scene::Mesh& mesh, BuildOptions options, std::set<std::string>& hashes) {
+    if (!cuda_) return;
+    options.backend = Backend::cuda;
+    try {
+      hashes.insert(verify::tree_hash(zkd::build(mesh.view(), options).view()));
+      ++result_.builds;
+      if (result_.backends.size() == 1) result_.backends.push_back("cuda");
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::backend_unavailable) throw;
+      cuda_ = false;
+    }
+  }
+
+  std::uint64_t seed_;
+  bool cuda_ = true;
+  Determinism result_;
+};
+
+}  // namespace
+
+std::vector<TreeQuality> measure_quality(const TestScene& scene, const std::vector<RaySet>& sets,
+                                         const cpu::Executor& executor) {
+  std::vector<TreeQuality> qualities;
+  const TriangleView triangles = scene.mesh.view();
+  for (const References references : {References::once, References::all}) {
+    BuildOptions options = options_with(references);
+    options.measure_quality = true;
+    const Tree tree = zkd::build(executor, triangles, options);
+    TreeQuality quality;
+    quality.scene = scene.name;
+    quality.references = zkd::to_string(references);
+    quality.triangles = triangles.triangle_count;
+    quality.sah_cost = tree.statistics().sah_cost;
+    quality.references_per_triangle =
+        static_cast<double>(tree.view().reference_count()) /
+        static_cast<double>(std::max<std::size_t>(1, triangles.triangle_count));
+    quality.tree_bytes = tree.statistics().tree_bytes;
+    quality.depth = tree.statistics().depth;
+
+    std::uint64_t rays = 0;
+    std::uint64_t visits = 0;
+    std::uint64_t tests = 0;
+    for (const RaySet& set : sets) {
+      if (set.group != "workload") continue;
+      std::vector<Hit> hits(set.rays.size());
+      std::vector<TraversalCost> costs(set.rays.size());
+      zkd::closest_hit(executor, tree.view(), triangles, set.rays, hits, costs);
+      for (const TraversalCost& cost : costs) {
+        visits += cost.node_visits;
+        tests += cost.triangle_tests;
+      }
+      rays += set.rays.size();
+      quality.deepest_stack = std::max(quality.deepest_stack,
+                                       deepest_stack(executor, tree.view(), triangles, set.rays));
+    }
+    if (rays > 0) {
+      quality.node_visits_per_ray = static_cast<double>(visits) / static_cast<double>(rays);
+      quality.triangle_tests_per_ray = static_cast<double>(tests) / static_cast<double>(rays);
+    }
+    qualities.push_back(quality);
+  }
+  return qualities;
+}
+
+Determinism compare_hashes(const std::vector<TestScene>& scenes, std::uint64_t small_meshes,
+                           std::uint64_t seed) {
+  HashComparison comparison(seed);
+  scene::Progress progress("hashes", small_meshes + scenes.size());
+  const auto compare = [&](const std::string& name, const scene::Mesh& mesh) {
+    for (const References references : {References::once, References::all}) {
+      comparison.compare(name, mesh, references);
+    }
+    progress.advance(1);
+  };
+  for (const TestScene& scene : scenes) compare(scene.name, scene.mesh);
+  for (std::uint64_t i = 0; i < small_meshes; ++i) {
+    const test::NamedMesh named = test::small_mesh(static_cast<int>(i % test::small_mesh_kinds),
+                                                   seed + i / test::small_mesh_kinds);
+    compare(named.name, named.mesh);
+  }
+  return comparison.result();
+}
+
+}  // namespace zkd::bench::accuracy
