@@ -32,32 +32,32 @@ std::string seen(std::uint64_t count, std::uint64_t n) {
 void print_errors(std::ostream& out, const Report& report) {
   if (report.errors.empty()) return;
   line(out, "\nE1, E2, E4 against exact arithmetic; benign: another id, t within 4 ulp");
-  line(out, "%-27s%-12s%10s%9s%9s%9s%9s%9s", "", "rays", "number", "missed", "phantom", "benign",
+  line(out, "%-29s%-12s%10s%9s%9s%9s%9s%9s", "", "rays", "number", "missed", "phantom", "benign",
        "wrong", "outside");
   for (const ErrorsOf& one : report.errors) {
     const Counts c = one.score.total();
-    line(out, "%-27s%-12s%10llu%9llu%9llu%9llu%9llu%9s", one.name.c_str(), one.rays.c_str(),
+    line(out, "%-29s%-12s%10llu%9llu%9llu%9llu%9llu%9s", one.name.c_str(), one.rays.c_str(),
          ull(c.rays), ull(c.missed), ull(c.phantom), ull(c.wrong_benign), ull(c.wrong_real),
          one.score.judged ? std::to_string(c.outside_band()).c_str() : "-");
   }
   line(out, "by class: errors of all kinds, of rays whose exact hit is");
-  line(out, "%-27s%-12s%12s%12s%12s%12s%12s", "", "rays", "interior", "edge", "vertex", "duplicate",
+  line(out, "%-29s%-12s%11s%11s%11s%11s%11s", "", "rays", "interior", "edge", "vertex", "duplicate",
        "miss");
   for (const ErrorsOf& one : report.errors) {
     std::string cells;
     for (const Counts& counts : one.score.of_class) {
       char cell[32];
       const std::string text = counts.rays == 0 ? "-" : seen(counts.errors(), counts.rays);
-      std::snprintf(cell, sizeof cell, "%12s", text.c_str());
+      std::snprintf(cell, sizeof cell, "%11s", text.c_str());
       cells += cell;
     }
-    line(out, "%-27s%-12s%s", one.name.c_str(), one.rays.c_str(), cells.c_str());
+    line(out, "%-29s%-12s%s", one.name.c_str(), one.rays.c_str(), cells.c_str());
   }
   line(out, "t, ulp of float");
-  line(out, "%-27s%-12s%10s%10s%10s%10s", "", "rays", "median", "p99", "p99.9", "max");
+  line(out, "%-29s%-12s%10s%10s%10s%10s", "", "rays", "median", "p99", "p99.9", "max");
   for (const ErrorsOf& one : report.errors) {
     const Quantiles q = one.score.all_t_ulps().quantiles();
-    line(out, "%-27s%-12s%10.3g%10.3g%10.3g%10.3g", one.name.c_str(), one.rays.c_str(), q.median,
+    line(out, "%-29s%-12s%10.3g%10.3g%10.3g%10.3g", one.name.c_str(), one.rays.c_str(), q.median,
          q.p99, q.p999, q.max);
   }
 }
@@ -65,14 +65,14 @@ void print_errors(std::ostream& out, const Report& report) {
 void print_e3(std::ostream& out, const TreeAgainstLoops& e3) {
   line(out, "\nE3, tree against brute force, bit by bit: %llu trees", ull(e3.cases));
   for (const TreeAgainstLoop& one : e3.of_intersector) {
-    line(out, "%-27s%12llu rays%22s different%22s any hit", one.intersector.c_str(), ull(one.rays),
+    line(out, "%-29s%12llu rays%18s different%18s any hit", one.intersector.c_str(), ull(one.rays),
          seen(one.different, one.rays).c_str(), seen(one.any_hit_different, one.rays).c_str());
   }
 }
 
 void print_e5(std::ostream& out, const Leaks& e5) {
   line(out, "\nE5, leaks (and surfaces hit twice) from inside %zu closed meshes", e5.meshes.size());
-  line(out, "%-27s%12s%15s%15s%15s%15s", "", "rays", "random", "edge", "vertex", "near vertex");
+  line(out, "%-29s%11s%15s%15s%15s%15s", "", "rays", "random", "edge", "vertex", "near vertex");
   for (const LeaksOf& one : e5.of) {
     std::string cells;
     for (const LeakCounts& counts : one.of_target) {
@@ -82,16 +82,16 @@ void print_e5(std::ostream& out, const Leaks& e5) {
       std::snprintf(cell, sizeof cell, "%15s", text.c_str());
       cells += cell;
     }
-    line(out, "%-27s%12llu%s", one.name.c_str(), ull(one.total().rays), cells.c_str());
+    line(out, "%-29s%11llu%s", one.name.c_str(), ull(one.total().rays), cells.c_str());
   }
 }
 
 void print_e6(std::ostream& out, const std::vector<TreeQuality>& e6) {
   line(out, "\nE6, trees (SAH cost over the exact-SAH kd-tree's: no such builder in this version)");
-  line(out, "%-27s%8s%12s%12s%10s%8s%7s%7s", "", "SAH", "nodes/ray", "tests/ray", "refs/tri", "MB",
+  line(out, "%-29s%8s%12s%12s%10s%8s%7s%7s", "", "SAH", "nodes/ray", "tests/ray", "refs/tri", "MB",
        "depth", "stack");
   for (const TreeQuality& q : e6) {
-    line(out, "%-27s%8.1f%12.2f%12.2f%10.2f%8.1f%7u%7u", (q.scene + " " + q.references).c_str(),
+    line(out, "%-29s%8.1f%12.2f%12.2f%10.2f%8.1f%7u%7u", (q.scene + " " + q.references).c_str(),
          q.sah_cost, q.node_visits_per_ray, q.triangle_tests_per_ray, q.references_per_triangle,
          1e-6 * static_cast<double>(q.tree_bytes), q.depth, q.deepest_stack);
   }
@@ -110,7 +110,7 @@ void print_e7(std::ostream& out, const Determinism& e7) {
 void print_curves(std::ostream& out, const Report& report) {
   if (report.points.empty()) return;
   line(out, "\nRun time against error: points that nothing beats in build + trace and in error");
-  line(out, "%-20s%-13s%-27s%10s%10s%9s%11s", "scene", "rays", "setting", "build ms", "trace ms",
+  line(out, "%-19s%-12s%-28s%10s%10s%9s%11s", "scene", "rays", "setting", "build ms", "trace ms",
        "ns/ray", "error");
   for (const Point& point : report.points) {
     if (!point.pareto) continue;
@@ -121,7 +121,7 @@ void print_curves(std::ostream& out, const Report& report) {
     } else {
       std::snprintf(error, sizeof error, "%.2e", point.error());
     }
-    line(out, "%-20s%-13s%-27s%10.2f%10.2f%9.1f%11s", point.scene.c_str(), point.rays.c_str(),
+    line(out, "%-19s%-12s%-28s%10.2f%10.2f%9.1f%11s", point.scene.c_str(), point.rays.c_str(),
          point.setting.c_str(), point.build_ms.median, point.trace_ms.median, point.ns_per_ray,
          error);
   }
