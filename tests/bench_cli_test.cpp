@@ -3,89 +3,26 @@
 // zkd-bench from the outside: exit status, one-line errors, JSON, and silence where it is due.
 // ZKD_BENCH_PATH is the program.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
+#include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "support/program.hpp"
+
 namespace {
 
+using namespace zkd::test;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-std::string contents(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-void write(const fs::path& file, const std::string& text) {
-  std::ofstream(file, std::ios::binary) << text;
-}
-
-std::size_t lines_of(const std::string& text) {
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-}
-
-// A tetrahedron: closed, four triangles, vertices shared.
-constexpr const char* tetrahedron =
-    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
-
-class BenchCli : public testing::Test {
+class BenchCli : public ProgramTest {
  protected:
-  struct Outcome {
-    int status = -1;
-    std::string out;
-    std::string err;
-  };
-
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "zkd-bench-test-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    write(folder_ / "tetra.obj", tetrahedron);
-  }
-  void TearDown() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-
-  // Runs `zkd-bench arguments` in the test's folder. Standard output is read through a pipe.
-  Outcome run(const std::string& arguments, const std::string& environment = "") const {
-    const fs::path err = folder_ / "stderr";
-    const std::string command = "cd '" + folder_.string() + "' && " + environment +
-                                " exec '" ZKD_BENCH_PATH "' " + arguments + " 2>'" + err.string() +
-                                "'";
-    Outcome outcome;
-    FILE* const pipe = popen(command.c_str(), "r");
-    if (pipe == nullptr) return outcome;
-    char buffer[4096];
-    for (std::size_t read = 0; (read = std::fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
-      outcome.out.append(buffer, read);
-    }
-    const int status = pclose(pipe);
-    outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    outcome.err = contents(err);
-    return outcome;
-  }
-
-  // Exit status as given, and exactly one line on stderr that says `naming`.
-  void expect_error(const std::string& arguments, int status, const std::string& naming) const {
-    SCOPED_TRACE(arguments);
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.status, status);
-    EXPECT_EQ(lines_of(outcome.err), 1u) << outcome.err;
-    EXPECT_TRUE(outcome.err.starts_with("zkd-bench: error: ")) << outcome.err;
-    EXPECT_NE(outcome.err.find(naming), std::string::npos) << outcome.err;
-  }
+  BenchCli() : ProgramTest(ZKD_BENCH_PATH, "zkd-bench") {}
 
   // Whatever comes out: a wrong tree (status 1) is an answer too.
   bool cuda_answers() const {
@@ -96,21 +33,8 @@ class BenchCli : public testing::Test {
     return run("tetra.obj --backend cpu --check 1" + std::string(quick)).status == 0;
   }
 
-  Json run_json(const std::string& arguments) const {
-    const Outcome outcome = run(arguments + " --json -");
-    EXPECT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_EQ(outcome.err, "");
-    return Json::parse(outcome.out, nullptr, false);
-  }
-
   static constexpr const char* quick = " --size 32 --repeat 2 --threads 2";
-  fs::path folder_;
 };
-
-void expect_keys(const Json& object, const std::vector<std::string>& keys) {
-  ASSERT_TRUE(object.is_object()) << object.dump();
-  for (const std::string& key : keys) EXPECT_TRUE(object.contains(key)) << key;
-}
 
 void expect_spread(const Json& spread, std::size_t n) {
   expect_keys(spread, {"median", "min", "max", "n"});

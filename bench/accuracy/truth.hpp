@@ -48,7 +48,7 @@ class Truth {
     return {ties_.data() + first_tie_[ray], ties_.data() + first_tie_[ray + 1]};
   }
 
-  /// Seconds that the oracle took, of all threads together.
+  /// Processor time that the oracle took, of all threads together.
   [[nodiscard]] double oracle_seconds() const { return oracle_seconds_; }
 
  private:
