@@ -18,7 +18,7 @@ struct TreeAgainstLoop {
 };
 
 struct TreeAgainstLoops {
-  std::uint64_t cases = 0;  ///< trees: a mesh and build options
+  std::uint64_t cases = 0;  ///< trees: a mesh and build options, each with one intersector
   std::vector<TreeAgainstLoop> of_intersector;
   std::string first_difference;  ///< mesh, options and ray of the first; empty if there is none
 

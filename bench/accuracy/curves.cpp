@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "contender.hpp"
 #include "runner.hpp"
@@ -19,7 +20,7 @@ struct Entrant {
   std::string name;
   std::string family;
   bool peer = false;
-  bool judged = false;  // by the band of our intersector
+  std::optional<Intersector> judged_as;  // by whose band; nothing for other walks and peers
   std::unique_ptr<Runner> runner;
   double references_per_triangle = 0.0;
   Samples build_ms;
@@ -63,7 +64,7 @@ class Measurement {
       Entrant entrant;
       entrant.name = setting.name;
       entrant.family = setting.family;
-      entrant.judged = setting.walk == Walk::library;
+      if (setting.walk == Walk::library) entrant.judged_as = setting.intersector;
       entrant.runner = make_runner(setting, scene_.mesh, executor_);
       entrants.push_back(std::move(entrant));
     }
@@ -116,9 +117,10 @@ class Measurement {
       entrant.runner->closest_hit(rays, hits_);
       of_set.trace_ms.push_back(watch.ms());
       if (first) {
-        of_set.score = score({*set.truth, scene_.mesh.view(), entrant.judged ? &oracle_ : nullptr,
-                              executor_.threads},
-                             hits_, of_set.stride);
+        of_set.score =
+            score({*set.truth, scene_.mesh.view(), entrant.judged_as ? &oracle_ : nullptr,
+                   entrant.judged_as, executor_.threads},
+                  hits_, of_set.stride);
       }
     }
     entrant.runner->clear();

@@ -122,6 +122,9 @@ Json e4_rows(const Report& report) {
     rows.push_back({{"name", one.name},
                     {"rays_kind", one.rays},
                     {"t_ulp", json_of(one.score.all_t_ulps().quantiles())},
+                    {"above_bound", one.score.above_bound ? rate(*one.score.above_bound,
+                                                                 one.score.all_t_ulps().count())
+                                                          : Json(nullptr)},
                     {"bins", bins}});
   }
   return rows;
@@ -149,6 +152,7 @@ void add_errors(Json& json, const Report& report) {
   const Histogram all = ours->all_t_ulps();
   json["e4"] = {{"rays", all.count()},
                 {"t_ulp", json_of(all.quantiles())},
+                {"above_bound", or_null(ours->above_bound)},
                 {"uv_unit", "2^-24"},
                 {"rows", e4_rows(report)}};
 }

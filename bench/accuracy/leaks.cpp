@@ -202,13 +202,19 @@ Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays, std:
       std::string name;
       bool peer;
       std::unique_ptr<Runner> runner;
+      std::uint64_t rays;  // as many or a block more
     };
     std::vector<Entrant> entrants;
-    entrants.push_back(
-        {"watertight", false, make_runner(all_settings().front(), closed.mesh, executor)});
+    for (const Setting& setting : all_settings()) {
+      if (setting.family != "intersector") continue;
+      const bool slow = setting.intersector == Intersector::exact;
+      entrants.push_back({setting.name, false, make_runner(setting, closed.mesh, executor),
+                          slow ? of_mesh / 16 : of_mesh});
+    }
     if (peers) {
       for (Peer& peer : make_peers(closed.mesh, executor.threads)) {
-        entrants.push_back({peer.name, true, std::move(peer.runner)});
+        entrants.push_back({peer.name, true, std::move(peer.runner),
+                            std::min(of_mesh, most_rays_of_peers / meshes.size())});
       }
     }
     for (Entrant& entrant : entrants) entrant.runner->build();
@@ -218,7 +224,7 @@ Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays, std:
       const auto block =
           aim.rays(static_cast<std::size_t>(std::min<std::uint64_t>(rays_at_once, of_mesh - done)));
       for (Entrant& entrant : entrants) {
-        if (entrant.peer && done >= most_rays_of_peers / meshes.size()) continue;
+        if (done >= entrant.rays) continue;
         count(*entrant.runner, closed.name, oracle, block,
               entry(leaks, entrant.name, entrant.peer));
       }

@@ -44,8 +44,8 @@ struct Leaks {
   std::vector<LeaksOf> of;
 };
 
-/// About `rays` rays on generated closed meshes and on those of `scenes` that are closed. Peers get
-/// as many, 10^7 at most.
+/// About `rays` rays on generated closed meshes and on those of `scenes` that are closed, for
+/// each intersector (`exact`: a sixteenth). Peers get as many, 10^7 at most.
 [[nodiscard]] Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays,
                                 std::uint64_t seed, const cpu::Executor& executor, bool peers);
 

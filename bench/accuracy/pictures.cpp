@@ -64,7 +64,8 @@ void write_literal_errors(const std::filesystem::path& folder, const TestScene& 
   options.invalid_triangles = InvalidTriangles::skip;
   const Tree tree = zkd::build(executor, triangles, options);
   std::vector<Hit> hits(primary.rays.size());
-  closest_hit(Walk::literal, executor, tree.view(), triangles, primary.rays, hits);
+  closest_hit(Walk::literal, Intersector::watertight, executor, tree.view(), triangles,
+              primary.rays, hits);
 
   std::vector<std::uint8_t> shades(primary.rays.size(), 255);
   std::vector<std::uint8_t> errors(primary.rays.size(), 0);

@@ -26,7 +26,8 @@ class ZkdRunner final : public Runner {
   }
 
   void closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
-    accuracy::closest_hit(setting_.walk, executor_, tree_.view(), triangles_, rays, hits);
+    accuracy::closest_hit(setting_.walk, setting_.intersector, executor_, tree_.view(), triangles_,
+                          rays, hits);
   }
 
   void clear() override { tree_ = Tree(); }

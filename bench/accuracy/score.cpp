@@ -38,6 +38,24 @@ double phantom_distance(const TriangleView& triangles, const Ray& ray, std::uint
   return error_of(std::max(0.0, -std::min({u, v, 1.0 - u - v})), 0x1p-24);
 }
 
+// What zkd/query.hpp promises of |t - exact t|, without the rounding of t to float; nothing where
+// it promises nothing.
+std::optional<double> promised(Intersector intersector, const Truth::Answer& exact) {
+  const double k = exact.condition;
+  switch (intersector) {
+    case Intersector::watertight:
+    case Intersector::double_precision:
+      return (9.0 * k + 14.0) * 0x1p-53 * exact.reach;
+    case Intersector::single_precision:
+      return (8.0 * k + 15.0) * 0x1p-24 * exact.reach;
+    case Intersector::exact:
+      return 0.0;
+    case Intersector::fast:
+      break;
+  }
+  return std::nullopt;
+}
+
 class Examiner {
  public:
   Examiner(const Exam& exam, std::span<const Hit> hits, std::size_t stride)
@@ -60,7 +78,8 @@ class Examiner {
     }
 
     bool in_band = false;
-    if (exam_.oracle != nullptr) {
+    // What promises to be exact has no band.
+    if (exam_.oracle != nullptr && exam_.intersector != Intersector::exact) {
       in_band = verify::judge(*exam_.oracle, exam_.triangles, exam_.truth.rays()[ray], hit).in_band;
     }
     if (!in_band && !score_.first_offender) score_.first_offender = ray;
@@ -85,10 +104,22 @@ class Examiner {
  private:
   void count_correct(const Hit& hit, const Truth::Answer& exact, std::uint32_t first_tie) {
     const std::size_t bin = bin_of(exact.condition);
+    if (exam_.intersector) count_above_bound(hit, exact);
     score_.t_ulps[bin].add(error_of(static_cast<double>(hit.t) - exact.t, float_ulp(exact.t)));
     if (hit.triangle != first_tie) return;
     score_.uv_units[bin].add(error_of(static_cast<double>(hit.u) - exact.u, 0x1p-24));
     score_.uv_units[bin].add(error_of(static_cast<double>(hit.v) - exact.v, 0x1p-24));
+  }
+
+  void count_above_bound(const Hit& hit, const Truth::Answer& exact) {
+    const std::optional<double> bound = promised(*exam_.intersector, exact);
+    if (!bound) return;
+    const auto t = static_cast<double>(hit.t);
+    // Half a unit of the rounding to float, and that of the exact t to double.
+    const double rounding =
+        0.5 * float_ulp(std::max(std::abs(t), std::abs(exact.t))) + 0x1p-52 * std::abs(exact.t);
+    const bool above = !(std::abs(t - exact.t) <= *bound + rounding);
+    score_.above_bound = score_.above_bound.value_or(0) + (above ? 1 : 0);
   }
 
   const Exam& exam_;
@@ -136,6 +167,7 @@ void Score::add(const Score& other) {
     uv_units[i] += other.uv_units[i];
   }
   phantom_units += other.phantom_units;
+  if (other.above_bound) above_bound = above_bound.value_or(0) + *other.above_bound;
   if (!first_offender) first_offender = other.first_offender;
   judged = judged || other.judged;
 }

@@ -11,6 +11,7 @@
 #include <span>
 
 #include <zkd/geometry.hpp>
+#include <zkd/query.hpp>
 
 #include "histogram.hpp"
 #include "truth.hpp"
@@ -61,6 +62,10 @@ struct Score {
   /// plane.
   Histogram phantom_units;
 
+  /// Correct hits whose t is further off than Intersector promises; known where there is such a
+  /// promise.
+  std::optional<std::uint64_t> above_bound;
+
   /// A ray answered outside the band (or, where nobody judged, wrongly): the first.
   std::optional<std::uint64_t> first_offender;
 
@@ -74,12 +79,13 @@ struct Score {
 /// The float ulp at x.
 [[nodiscard]] double float_ulp(double x);
 
-/// What score() holds answers against. With `oracle` every wrong answer is judged by the error band
-/// of zkd's intersector (verify/band.hpp).
+/// What score() holds answers against. With `oracle` and `intersector` every wrong answer is judged
+/// by the error band of that intersector (verify/band.hpp), and every t by its bound.
 struct Exam {
   const Truth& truth;
   const TriangleView& triangles;
   const verify::Oracle* oracle = nullptr;
+  std::optional<Intersector> intersector;
   int threads = 1;
 };
 

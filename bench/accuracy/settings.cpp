@@ -10,11 +10,14 @@ std::vector<Setting> all_settings() {
   base.invalid_triangles = InvalidTriangles::skip;
   std::vector<Setting> settings;
   const auto add = [&](const char* family, const std::string& name, const BuildOptions& build,
-                       Walk walk = Walk::library) {
-    settings.push_back({family, name, build, walk});
+                       Walk walk = Walk::library,
+                       Intersector intersector = Intersector::watertight) {
+    settings.push_back({family, name, build, walk, intersector});
   };
 
-  add("intersector", default_setting, base);
+  for (const Intersector intersector : all_intersectors) {
+    add("intersector", zkd::to_string(intersector), base, Walk::library, intersector);
+  }
   for (const References references : {References::once, References::all}) {
     BuildOptions build = base;
     build.references = references;

@@ -45,15 +45,21 @@ verify::Point point(const glm::vec3& v) {
 
 Truth::Answer answer_of(const verify::ExactHit& hit, const TriangleView& triangles,
                         const Ray& ray) {
-  if (!hit.hit) return {std::numeric_limits<double>::infinity(), 0.0, 0.0, 0.0, RayClass::miss};
+  if (!hit.hit)
+    return {std::numeric_limits<double>::infinity(), 0.0, 0.0, 0.0, 0.0, RayClass::miss};
   const verify::Corners corners = *verify::finite_corners(triangles, hit.ties.front());
   const verify::Point o = point(ray.origin);
   const verify::Point d = point(ray.direction);
   const verify::PlaneHit plane = verify::plane_hit(o, d, corners);
   const verify::Barycentrics place = verify::barycentrics(o, d, corners);
   const double length = std::hypot(d[0], d[1], d[2]);
-  return {hit.t, length * (plane.normal / std::abs(plane.denominator)), place.u, place.v,
-          class_of(hit.hit_class)};
+  double reach = 0.0;
+  for (const verify::Point& corner : corners) {
+    for (std::size_t a = 0; a < 3; ++a) reach = std::max(reach, std::abs(corner[a] - o[a]));
+  }
+  return {hit.t,          length * (plane.normal / std::abs(plane.denominator)),
+          reach / length, place.u,
+          place.v,        class_of(hit.hit_class)};
 }
 
 }  // namespace

@@ -31,6 +31,8 @@ class Truth {
     /// |d| |n| / |d . n| for the first triangle of the tie set: 1 for a ray along its normal,
     /// infinite for one in its plane.
     double condition;
+    /// Largest distance along an axis from the origin to a corner of it, in units of t.
+    double reach;
     double u;  ///< where the first triangle of the tie set is hit, as in Hit
     double v;
     RayClass ray_class;

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include <zkd/query.hpp>
+#include <zkd/traversal/intersect.hpp>
 #include <zkd/traversal/traverse.hpp>
 
 #include "cpu/threads.hpp"
@@ -15,10 +15,11 @@
 namespace zkd::bench::accuracy {
 namespace {
 
-using core::Candidate;
 using core::Entries;
 using core::PreparedRay;
 using core::Real;
+using Intersect = core::Watertight;
+using Candidate = Intersect::Candidate;
 
 constexpr std::uint32_t rays_at_once = 64;
 
@@ -72,13 +73,13 @@ class PaddedBoxTest {
 };
 
 // The hits on a leaf's triangles that lie between `near` and `far`. Returns whether there was one.
-bool intersect_leaf(const TreeView& tree, const TriangleView& triangles, const PreparedRay& ray,
+bool intersect_leaf(const TreeView& tree, const TriangleView& triangles, const Intersect& intersect,
                     std::uint32_t leaf, Real near, Real far, Candidate& best) {
   bool found = false;
   for (std::uint32_t r = tree.leaf_offsets[leaf]; r < tree.leaf_offsets[leaf + 1]; ++r) {
     const std::uint32_t id = tree.references[r];
     Candidate candidate = best;
-    if (!core::intersect(ray, core::corners_of(triangles, id), id, candidate)) continue;
+    if (!intersect(core::corners_of(triangles, id), id, candidate)) continue;
     const Real t = static_cast<float>(candidate.t.value);
     if (!(near <= t && t <= far)) continue;
     best = candidate;
@@ -93,8 +94,8 @@ struct Waiting {
   float far;
 };
 
-Candidate walk_naively(const TreeView& tree, const TriangleView& triangles,
-                       const PreparedRay& ray) {
+Candidate walk_naively(const TreeView& tree, const TriangleView& triangles, const PreparedRay& ray,
+                       const Intersect& intersect) {
   const PlainBoxes boxes(ray, 1.0F);
   Candidate best;
   Waiting stack[max_depth + 1];
@@ -106,7 +107,7 @@ Candidate walk_naively(const TreeView& tree, const TriangleView& triangles,
     if (entry.near > best.limit.value) continue;
     const Link link{entry.link};
     if (link.is_leaf()) {
-      intersect_leaf(tree, triangles, ray, link.index(), entry.near, entry.far, best);
+      intersect_leaf(tree, triangles, intersect, link.index(), entry.near, entry.far, best);
       continue;
     }
     const Node& node = tree.nodes[link.index()];
@@ -138,7 +139,7 @@ bool clip_to_scene(const TreeView& tree, const PreparedRay& ray, Real& near, Rea
 
 // Kaplan's walk over the planes of a kd-tree: cells front to back, each an interval of t.
 Candidate walk_literally(const TreeView& tree, const TriangleView& triangles,
-                         const PreparedRay& ray) {
+                         const PreparedRay& ray, const Intersect& intersect) {
   Candidate best;
   Real near = ray.first;
   Real far = ray.last;
@@ -164,7 +165,7 @@ Candidate walk_literally(const TreeView& tree, const TriangleView& triangles,
         far = at;
       }
     }
-    if (intersect_leaf(tree, triangles, ray, link.index(), near, far, best)) return best;
+    if (intersect_leaf(tree, triangles, intersect, link.index(), near, far, best)) return best;
     if (waiting == 0) return best;
     const Waiting& next = stack[--waiting];
     link = Link{next.link};
@@ -179,8 +180,9 @@ void for_each_ray(const cpu::Executor& executor, const TreeView& tree, std::span
   const auto count = static_cast<std::uint32_t>(rays.size());
   cpu::Threads(executor).share(count, rays_at_once, [=](cpu::Range range) {
     for (std::uint32_t i = range.begin; i < range.end; ++i) {
-      const PreparedRay prepared(tree, rays[i]);
-      hits[i] = prepared.valid ? core::to_hit(trace(prepared)) : Hit{};
+      const PreparedRay prepared(tree, rays[i], Intersect::slab_units);
+      hits[i] =
+          prepared.valid ? core::to_hit(trace(prepared, Intersect(prepared, rays[i]))) : Hit{};
     }
   });
 }
@@ -248,29 +250,36 @@ const char* to_string(Walk value) noexcept {
   return "library";
 }
 
-void closest_hit(Walk walk, const cpu::Executor& executor, const TreeView& tree,
-                 const TriangleView& triangles, std::span<const Ray> rays, std::span<Hit> hits) {
+void closest_hit(Walk walk, Intersector intersector, const cpu::Executor& executor,
+                 const TreeView& tree, const TriangleView& triangles, std::span<const Ray> rays,
+                 std::span<Hit> hits) {
   switch (walk) {
     case Walk::library:
-      zkd::closest_hit(executor, tree, triangles, rays, hits);
+      zkd::closest_hit(executor, tree, triangles, rays, hits, {}, intersector);
       return;
     case Walk::slab:
-      for_each_ray(executor, tree, rays, hits, [=](const PreparedRay& ray) {
-        return core::traverse<false, core::BoxTest>(tree, triangles, ray, nullptr);
-      });
+      for_each_ray(
+          executor, tree, rays, hits, [=](const PreparedRay& ray, const Intersect& intersect) {
+            return core::traverse<false, core::BoxTest>(tree, triangles, ray, intersect, nullptr);
+          });
       return;
     case Walk::padded:
-      for_each_ray(executor, tree, rays, hits, [=](const PreparedRay& ray) {
-        return core::traverse<false, PaddedBoxTest>(tree, triangles, ray, nullptr);
-      });
+      for_each_ray(
+          executor, tree, rays, hits, [=](const PreparedRay& ray, const Intersect& intersect) {
+            return core::traverse<false, PaddedBoxTest>(tree, triangles, ray, intersect, nullptr);
+          });
       return;
     case Walk::naive:
       for_each_ray(executor, tree, rays, hits,
-                   [=](const PreparedRay& ray) { return walk_naively(tree, triangles, ray); });
+                   [=](const PreparedRay& ray, const Intersect& intersect) {
+                     return walk_naively(tree, triangles, ray, intersect);
+                   });
       return;
     case Walk::literal:
       for_each_ray(executor, tree, rays, hits,
-                   [=](const PreparedRay& ray) { return walk_literally(tree, triangles, ray); });
+                   [=](const PreparedRay& ray, const Intersect& intersect) {
+                     return walk_literally(tree, triangles, ray, intersect);
+                   });
       return;
   }
 }
@@ -282,11 +291,12 @@ std::uint32_t deepest_stack(const cpu::Executor& executor, const TreeView& tree,
   const auto count = static_cast<std::uint32_t>(rays.size());
   cpu::Threads(executor).share(count, rays_at_once, [=](cpu::Range range) {
     for (std::uint32_t i = range.begin; i < range.end; ++i) {
-      const PreparedRay prepared(tree, rays[i]);
+      const PreparedRay prepared(tree, rays[i], Intersect::slab_units);
       StackMeter::nodes = tree.nodes;
       StackMeter::deepest_seen = 0;
       if (prepared.valid) {
-        (void)core::traverse<false, StackMeter>(tree, triangles, prepared, nullptr);
+        const Intersect intersect(prepared, rays[i]);
+        (void)core::traverse<false, StackMeter>(tree, triangles, prepared, intersect, nullptr);
       }
       written[i] = StackMeter::deepest_seen;
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Other ways to walk a finished tree than the library's: what they cost, and what they miss. All
-// of them call the library's intersector, so a difference is the walk's alone.
+// of them call the library's watertight intersector, so a difference is the walk's alone.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 
 #include <zkd/cpu/executor.hpp>
 #include <zkd/geometry.hpp>
+#include <zkd/query.hpp>
 #include <zkd/tree.hpp>
 
 namespace zkd::bench::accuracy {
@@ -26,9 +27,11 @@ enum class Walk {
 /// "library", ... Static storage.
 [[nodiscard]] const char* to_string(Walk value) noexcept;
 
-/// The nearest hit of each ray by that walk, on the executor's threads.
-void closest_hit(Walk walk, const cpu::Executor& executor, const TreeView& tree,
-                 const TriangleView& triangles, std::span<const Ray> rays, std::span<Hit> hits);
+/// The nearest hit of each ray by that walk, on the executor's threads. `intersector` is for
+/// Walk::library.
+void closest_hit(Walk walk, Intersector intersector, const cpu::Executor& executor,
+                 const TreeView& tree, const TriangleView& triangles, std::span<const Ray> rays,
+                 std::span<Hit> hits);
 
 /// Entries that wait at once, at most, while the library's walk answers these rays.
 [[nodiscard]] std::uint32_t deepest_stack(const cpu::Executor& executor, const TreeView& tree,
