@@ -30,8 +30,8 @@ struct Point {
   Spread trace_ms;
   double ns_per_ray = 0.0;  ///< at the median, on all threads
   Score score;
-  bool pareto = false;  ///< of ours on this scene and these rays, none is both faster (build and
-                        ///< trace) and better
+  bool pareto = false;  ///< of all on this scene and these rays, none is faster (build and trace)
+                        ///< without being worse, or better without being slower
 
   [[nodiscard]] double build_and_trace_ms() const { return build_ms.median + trace_ms.median; }
   /// E1 + E2.

@@ -53,12 +53,13 @@ void print_errors(std::ostream& out, const Report& report) {
     }
     line(out, "%-29s%-12s%s", one.name.c_str(), one.rays.c_str(), cells.c_str());
   }
-  line(out, "t, ulp of float");
-  line(out, "%-29s%-12s%10s%10s%10s%10s", "", "rays", "median", "p99", "p99.9", "max");
+  line(out, "t, ulp of float; above: hits whose t is further off than its intersector promises");
+  line(out, "%-29s%-12s%10s%10s%10s%10s%14s", "", "rays", "median", "p99", "p99.9", "max", "above");
   for (const ErrorsOf& one : report.errors) {
     const Quantiles q = one.score.all_t_ulps().quantiles();
-    line(out, "%-29s%-12s%10.3g%10.3g%10.3g%10.3g", one.name.c_str(), one.rays.c_str(), q.median,
-         q.p99, q.p999, q.max);
+    const std::string above = one.score.above_bound ? seen(*one.score.above_bound, q.n) : "-";
+    line(out, "%-29s%-12s%10.3g%10.3g%10.3g%10.3g%14s", one.name.c_str(), one.rays.c_str(),
+         q.median, q.p99, q.p999, q.max, above.c_str());
   }
 }
 
