@@ -80,6 +80,7 @@ Json e1_rows(const Report& report) {
                     {"phantom", total.phantom},
                     {"in_band_missed", in_band(one.score, total.in_band_missed)},
                     {"in_band_phantom", in_band(one.score, total.in_band_phantom)},
+                    {"first_offender", text_or_null(one.first_offender)},
                     {"phantom_outside_units", json_of(one.score.phantom_units.quantiles())},
                     {"classes", classes}});
   }
@@ -122,6 +123,7 @@ Json e4_rows(const Report& report) {
     rows.push_back({{"name", one.name},
                     {"rays_kind", one.rays},
                     {"t_ulp", json_of(one.score.all_t_ulps().quantiles())},
+                    {"first_above_bound", text_or_null(one.first_above_bound)},
                     {"above_bound", one.score.above_bound ? rate(*one.score.above_bound,
                                                                  one.score.all_t_ulps().count())
                                                           : Json(nullptr)},

@@ -125,15 +125,6 @@ class Aim {
   test::Random random_;
 };
 
-std::string describe(const std::string& mesh, const Ray& ray) {
-  char text[256];
-  const auto d = [](float x) { return static_cast<double>(x); };
-  std::snprintf(text, sizeof text, ": origin %a %a %a, direction %a %a %a", d(ray.origin.x),
-                d(ray.origin.y), d(ray.origin.z), d(ray.direction.x), d(ray.direction.y),
-                d(ray.direction.z));
-  return mesh + text;
-}
-
 // Traces a block of rays and, from just behind each hit, what follows it.
 // A ray that exact arithmetic lets through too (in the planes of the triangles that it meets) is
 // no leak.
@@ -148,7 +139,7 @@ void count(Runner& runner, const std::string& mesh, const verify::Oracle& oracle
     if (hits[i].triangle == no_triangle) {
       if (!oracle.any_hit(rays[i])) continue;
       ++counts.leaks;
-      if (leaks.first_leak.empty()) leaks.first_leak = describe(mesh, rays[i]);
+      if (leaks.first_leak.empty()) leaks.first_leak = mesh + ": " + describe(rays[i]);
       continue;
     }
     const double t = static_cast<double>(hits[i].t);

@@ -17,6 +17,11 @@ void Report::add_errors(const std::vector<Point>& of_scene) {
     sum.name = point.setting;
     sum.rays = point.rays;
     sum.peer = point.peer;
+    const auto note = [&](std::string& text, const std::optional<Ray>& ray) {
+      if (text.empty() && ray) text = point.scene + ": " + describe(*ray);
+    };
+    note(sum.first_offender, point.score.first_offender);
+    note(sum.first_above_bound, point.score.first_above_bound);
     sum.score.add(point.score);
   }
 }
@@ -28,9 +33,11 @@ std::vector<std::string> Report::failures() const {
   };
   for (const ErrorsOf& one : errors) {
     if (!one.peer) {
-      count(one.score.total().outside_band(),
-            one.name + " answers to " + one.rays + " rays outside the error band");
-      count(one.score.above_bound.value_or(0), one.name + " t beyond the published bound");
+      count(one.score.total().outside_band(), one.name + " answers to " + one.rays +
+                                                  " rays outside the error band; " +
+                                                  one.first_offender);
+      count(one.score.above_bound.value_or(0),
+            one.name + " t beyond the published bound; " + one.first_above_bound);
     }
   }
   if (e3)

@@ -30,6 +30,8 @@ struct ErrorsOf {
   std::string rays;  ///< "workload" or "adversarial"
   bool peer = false;
   Score score;
+  std::string first_offender;     ///< scene and ray; empty if there is none
+  std::string first_above_bound;  ///< likewise
 };
 
 struct Report {

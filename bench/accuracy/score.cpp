@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <vector>
 
@@ -73,7 +74,7 @@ class Examiner {
     const bool answered = hit.triangle != no_triangle;
     if (ties.empty() && !answered) return;
     if (answered && std::binary_search(ties.begin(), ties.end(), hit.triangle)) {
-      count_correct(hit, exact, ties.front());
+      count_correct(hit, exact, ties.front(), ray);
       return;
     }
 
@@ -82,7 +83,7 @@ class Examiner {
     if (exam_.oracle != nullptr && exam_.intersector != Intersector::exact) {
       in_band = verify::judge(*exam_.oracle, exam_.triangles, exam_.truth.rays()[ray], hit).in_band;
     }
-    if (!in_band && !score_.first_offender) score_.first_offender = ray;
+    if (!in_band && !score_.first_offender) score_.first_offender = exam_.truth.rays()[ray];
     const std::uint64_t excused = in_band ? 1 : 0;
     if (!answered) {
       ++counts.missed;
@@ -102,16 +103,17 @@ class Examiner {
   [[nodiscard]] const Score& score() const { return score_; }
 
  private:
-  void count_correct(const Hit& hit, const Truth::Answer& exact, std::uint32_t first_tie) {
+  void count_correct(const Hit& hit, const Truth::Answer& exact, std::uint32_t first_tie,
+                     std::size_t ray) {
     const std::size_t bin = bin_of(exact.condition);
-    if (exam_.intersector) count_above_bound(hit, exact);
+    if (exam_.intersector) count_above_bound(hit, exact, ray);
     score_.t_ulps[bin].add(error_of(static_cast<double>(hit.t) - exact.t, float_ulp(exact.t)));
     if (hit.triangle != first_tie) return;
     score_.uv_units[bin].add(error_of(static_cast<double>(hit.u) - exact.u, 0x1p-24));
     score_.uv_units[bin].add(error_of(static_cast<double>(hit.v) - exact.v, 0x1p-24));
   }
 
-  void count_above_bound(const Hit& hit, const Truth::Answer& exact) {
+  void count_above_bound(const Hit& hit, const Truth::Answer& exact, std::size_t ray) {
     const std::optional<double> bound = promised(*exam_.intersector, exact);
     if (!bound) return;
     const auto t = static_cast<double>(hit.t);
@@ -120,6 +122,7 @@ class Examiner {
         0.5 * float_ulp(std::max(std::abs(t), std::abs(exact.t))) + 0x1p-52 * std::abs(exact.t);
     const bool above = !(std::abs(t - exact.t) <= *bound + rounding);
     score_.above_bound = score_.above_bound.value_or(0) + (above ? 1 : 0);
+    if (above && !score_.first_above_bound) score_.first_above_bound = exam_.truth.rays()[ray];
   }
 
   const Exam& exam_;
@@ -129,6 +132,15 @@ class Examiner {
 };
 
 }  // namespace
+
+std::string describe(const Ray& ray) {
+  char text[256];
+  const auto d = [](float x) { return static_cast<double>(x); };
+  std::snprintf(text, sizeof text, "origin %a %a %a, direction %a %a %a, t %a to %a",
+                d(ray.origin.x), d(ray.origin.y), d(ray.origin.z), d(ray.direction.x),
+                d(ray.direction.y), d(ray.direction.z), d(ray.t_min), d(ray.t_max));
+  return text;
+}
 
 double float_ulp(double x) {
   int exponent = 0;
@@ -169,6 +181,7 @@ void Score::add(const Score& other) {
   phantom_units += other.phantom_units;
   if (other.above_bound) above_bound = above_bound.value_or(0) + *other.above_bound;
   if (!first_offender) first_offender = other.first_offender;
+  if (!first_above_bound) first_above_bound = other.first_above_bound;
   judged = judged || other.judged;
 }
 

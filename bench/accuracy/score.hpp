@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 #include <zkd/geometry.hpp>
 #include <zkd/query.hpp>
@@ -66,8 +67,10 @@ struct Score {
   /// promise.
   std::optional<std::uint64_t> above_bound;
 
-  /// A ray answered outside the band (or, where nobody judged, wrongly): the first.
-  std::optional<std::uint64_t> first_offender;
+  /// The first ray answered outside the band (or, where nobody judged, wrongly), and the first
+  /// whose t is beyond the bound.
+  std::optional<Ray> first_offender;
+  std::optional<Ray> first_above_bound;
 
   bool judged = false;  ///< whether the counts in the band are known
 
@@ -75,6 +78,9 @@ struct Score {
   [[nodiscard]] Histogram all_t_ulps() const;
   void add(const Score& other);
 };
+
+/// Origin, direction and interval, in hexadecimal: to be shot again.
+[[nodiscard]] std::string describe(const Ray& ray);
 
 /// The float ulp at x.
 [[nodiscard]] double float_ulp(double x);
