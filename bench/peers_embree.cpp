@@ -74,10 +74,33 @@ class MemoryAccount {
   std::atomic<std::int64_t> base_{0};
 };
 
+// Embree's manual asks for flush-to-zero and denormals-are-zero on every thread that traces. It
+// sets them itself on a thread that starts it or builds, and leaves them so: what comes after must
+// not be computed in that mode.
+class FloatingPointMode {
+ public:
+#if defined(__x86_64__)
+  FloatingPointMode() : before_(_mm_getcsr()) {
+    constexpr unsigned flush_to_zero = 0x8000;
+    constexpr unsigned denormals_are_zero = 0x0040;
+    _mm_setcsr(before_ | flush_to_zero | denormals_are_zero);
+  }
+  ~FloatingPointMode() { _mm_setcsr(before_); }
+#else
+  FloatingPointMode() = default;
+#endif
+  FloatingPointMode(const FloatingPointMode&) = delete;             // tied to its thread
+  FloatingPointMode& operator=(const FloatingPointMode&) = delete;  // likewise
+
+ private:
+  [[maybe_unused]] unsigned before_ = 0;
+};
+
 // One Embree device for all settings: its worker threads start once.
 class Device {
  public:
   explicit Device(int threads) {
+    [[maybe_unused]] const FloatingPointMode mode;
     const std::string config = "threads=" + std::to_string(threads) + ",set_affinity=0";
     device_ = rtcNewDevice(config.c_str());
     if (device_ == nullptr) {
@@ -115,26 +138,6 @@ class Device {
  private:
   MemoryAccount account_;
   RTCDevice device_ = nullptr;
-};
-
-// Embree's manual asks for flush-to-zero and denormals-are-zero on every thread that traces.
-class FloatingPointMode {
- public:
-#if defined(__x86_64__)
-  FloatingPointMode() : before_(_mm_getcsr()) {
-    constexpr unsigned flush_to_zero = 0x8000;
-    constexpr unsigned denormals_are_zero = 0x0040;
-    _mm_setcsr(before_ | flush_to_zero | denormals_are_zero);
-  }
-  ~FloatingPointMode() { _mm_setcsr(before_); }
-#else
-  FloatingPointMode() = default;
-#endif
-  FloatingPointMode(const FloatingPointMode&) = delete;             // tied to its thread
-  FloatingPointMode& operator=(const FloatingPointMode&) = delete;  // likewise
-
- private:
-  [[maybe_unused]] unsigned before_ = 0;
 };
 
 // The calls that differ between Embree 3 and 4.
@@ -325,6 +328,7 @@ class Embree final : public EmbreeContender {
 
   double build() override {
     release();
+    [[maybe_unused]] const FloatingPointMode mode;
     device_->account().start();
     const Stopwatch watch;
     scene_ = rtcNewScene(device_->get());

@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "cpu/float_environment.hpp"
 #include "verify/band.hpp"
 #include "verify/exact.hpp"
 
@@ -79,9 +80,10 @@ class Examiner {
     }
 
     bool in_band = false;
-    // What promises to be exact has no band.
-    if (exam_.oracle != nullptr && exam_.intersector != Intersector::exact) {
-      in_band = verify::judge(*exam_.oracle, exam_.triangles, exam_.truth.rays()[ray], hit).in_band;
+    if (exam_.oracle != nullptr) {
+      in_band = verify::judge(*exam_.oracle, exam_.triangles, exam_.truth.rays()[ray], hit,
+                              exam_.intersector.value_or(Intersector::watertight))
+                    .in_band;
     }
     if (!in_band && !score_.first_offender) score_.first_offender = exam_.truth.rays()[ray];
     const std::uint64_t excused = in_band ? 1 : 0;
@@ -192,6 +194,8 @@ Score score(const Exam& exam, std::span<const Hit> hits, std::size_t stride) {
   std::vector<Score> scores(static_cast<std::size_t>(parts));
 #pragma omp parallel for num_threads(exam.threads)
   for (std::int64_t part = 0; part < parts; ++part) {
+    // A t may be denormal, whatever mode this thread was left in.
+    const cpu::FloatEnvironment environment;
     Examiner examiner(exam, hits, stride);
     for (std::int64_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
       examiner.examine(static_cast<std::size_t>(i));
