@@ -118,7 +118,7 @@ TEST_P(QueryIntersectors, RaysThatLeaveATriangleDoNotHitItAgain) {
 
         const double margin =
             intersector == Intersector::fast || intersector == Intersector::single_precision
-                ? 0x1p-15
+                ? 0x1p-16
                 : 0x1p-46;
         const double largest = largest_coordinate(triangles, hit.triangle);
         const glm::dvec3 point = point_of(triangles, hit);

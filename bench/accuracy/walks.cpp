@@ -180,7 +180,7 @@ void for_each_ray(const cpu::Executor& executor, const TreeView& tree, std::span
   const auto count = static_cast<std::uint32_t>(rays.size());
   cpu::Threads(executor).share(count, rays_at_once, [=](cpu::Range range) {
     for (std::uint32_t i = range.begin; i < range.end; ++i) {
-      const PreparedRay prepared(tree, rays[i], Intersect::slab_units);
+      const PreparedRay prepared(tree, rays[i], Intersect::hit_distance);
       hits[i] =
           prepared.valid ? core::to_hit(trace(prepared, Intersect(prepared, rays[i]))) : Hit{};
     }
@@ -291,7 +291,7 @@ std::uint32_t deepest_stack(const cpu::Executor& executor, const TreeView& tree,
   const auto count = static_cast<std::uint32_t>(rays.size());
   cpu::Threads(executor).share(count, rays_at_once, [=](cpu::Range range) {
     for (std::uint32_t i = range.begin; i < range.end; ++i) {
-      const PreparedRay prepared(tree, rays[i], Intersect::slab_units);
+      const PreparedRay prepared(tree, rays[i], Intersect::hit_distance);
       StackMeter::nodes = tree.nodes;
       StackMeter::deepest_seen = 0;
       if (prepared.valid) {

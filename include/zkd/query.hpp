@@ -44,18 +44,18 @@ namespace zkd {
 enum class Intersector : std::uint8_t {
   /// Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013. Single precision
   /// rejects, with an error bound; double precision decides what is left and gives t, u and v.
-  /// Within 6 * 2^-53 R; t to (9 k + 14) * 2^-53 R. The signs of its edge functions are those of
+  /// Within 6 * 2^-53 R; t to (9 k + 25) * 2^-53 R. The signs of its edge functions are those of
   /// one set of sheared corners, exactly, so triangles that share an edge never both miss a ray
   /// through it.
   watertight,
 
   /// Moeller, Trumbore, JGT 1997, in single precision. Rays may slip between triangles that share
   /// an edge, and t is as good as single precision lets it be: the point found on the ray lies
-  /// within 26 * 2^-24 R of the triangle, else double precision decides.
+  /// within 32 * 2^-24 R of the triangle, else double precision decides.
   fast,
 
   /// Woop, Benthin, Wald in single precision, with Kahan's difference of products: for devices on
-  /// which double precision is slow. Watertight. Within 5 * 2^-24 R; t to (8 k + 15) * 2^-24 R,
+  /// which double precision is slow. Watertight. Within 9 * 2^-24 R; t to (13 k + 26) * 2^-24 R,
   /// short of underflow.
   single_precision,
 
@@ -120,7 +120,7 @@ ZKD_API void closest_hit_brute_force(const cpu::Executor& executor, const TreeVi
 /// direction and t_min = 0 never hits the same triangle again (by the intersector given, which
 /// should be the one it will be traced with).
 ///
-/// No coordinate moves by more than 2^-46 of the largest coordinate of the triangle (2^-15 for
+/// No coordinate moves by more than 2^-46 of the largest coordinate of the triangle (2^-16 for
 /// `fast` and `single_precision`), and on to the next float. That is proven to be enough
 /// ("Spawned rays" in docs/accuracy.md). Near an edge the point may lie behind another triangle
 /// that meets this one there at less than a right angle, as with every offset.

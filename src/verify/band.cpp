@@ -305,7 +305,7 @@ Bounds bounds_of(Intersector intersector) noexcept {
       return {.unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 24.0, .t = 15.0};
     case Intersector::fast:
       return {
-          .unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 26.0, .t = 15.0, .product = 16.0};
+          .unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 32.0, .t = 15.0, .product = 16.0};
     case Intersector::exact:
       break;
   }

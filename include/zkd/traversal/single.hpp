@@ -26,7 +26,7 @@ class SinglePrecision {
  public:
   using Candidate = core::Candidate;
   static constexpr float hit_distance = 26.0F * 0x1p-24F;  // 24, and room for roundings
-  static constexpr double plane_margin = 0x1p-15;
+  static constexpr double plane_margin = 0x1p-16;
 
   ZKD_HOST_DEVICE SinglePrecision(const PreparedRay& ray, const Ray&) : ray_(ray) {}
 
@@ -60,8 +60,8 @@ class SinglePrecision {
 class Fast {
  public:
   using Candidate = core::Candidate;
-  static constexpr float hit_distance = 28.0F * 0x1p-24F;  // 26, and room for roundings
-  static constexpr double plane_margin = 0x1p-15;
+  static constexpr float hit_distance = 34.0F * 0x1p-24F;  // 32, and room for roundings
+  static constexpr double plane_margin = 0x1p-16;
 
   ZKD_HOST_DEVICE Fast(const PreparedRay& ray, const Ray&) : ray_(ray) {}
 
