@@ -6,14 +6,13 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
 
 #include "scene/load.hpp"
+#include "support/mesh_files.hpp"
 
 namespace zkd::test {
 
@@ -63,20 +62,6 @@ class SceneFiles : public testing::Test {
 /// The meshes that lie beside a developer's checkout; not part of the repository.
 inline std::filesystem::path shared_scenes() {
   return std::filesystem::path(ZKD_SOURCE_DIR) / ".." / "shared" / "scenes";
-}
-
-/// The bytes of a value, least significant first (x86-64 and AArch64 store it so).
-template <typename Value>
-std::string little_endian(Value value) {
-  std::string bytes(sizeof(Value), '\0');
-  std::memcpy(bytes.data(), &value, sizeof(Value));
-  return bytes;
-}
-
-template <typename Value>
-std::string big_endian(Value value) {
-  const std::string bytes = little_endian(value);
-  return {bytes.rbegin(), bytes.rend()};
 }
 
 }  // namespace zkd::test

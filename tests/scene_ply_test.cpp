@@ -13,42 +13,18 @@ using glm::uvec3;
 using glm::vec3;
 using PlyTest = SceneFiles;
 
-std::string header(const std::string& format, int vertices, int faces,
-                   const std::string& coordinate = "float", const std::string& list = "uchar int") {
-  return "ply\nformat " + format + " 1.0\ncomment made by a test\nelement vertex " +
-         std::to_string(vertices) + "\nproperty " + coordinate + " x\nproperty " + coordinate +
-         " y\nproperty " + coordinate + " z\nelement face " + std::to_string(faces) +
-         "\nproperty list " + list + " vertex_indices\nend_header\n";
-}
-
-const std::vector<vec3> corners{{0, 0, 0}, {1.5F, 0, 0}, {1.25F, 1, 0}, {0, 1, -3.1F}};
-
-/// Four vertices, a quad and a triangle.
-template <typename Coordinate, typename Count, typename Index, bool big>
-std::string binary_body() {
-  const auto bytes = [](auto value) { return big ? big_endian(value) : little_endian(value); };
-  std::string body;
-  for (const vec3& p : corners) {
-    for (int a = 0; a < 3; ++a) body += bytes(static_cast<Coordinate>(p[a]));
-  }
-  body += bytes(static_cast<Count>(4));
-  for (const int i : {0, 1, 2, 3}) body += bytes(static_cast<Index>(i));
-  body += bytes(static_cast<Count>(3));
-  for (const int i : {3, 1, 0}) body += bytes(static_cast<Index>(i));
-  return body;
-}
-
 const std::vector<uvec3> faces{{0, 1, 2}, {0, 2, 3}, {3, 1, 0}};
 
 TEST_F(PlyTest, Text) {
-  const scene::Mesh mesh = load(
-      "a.ply", header("ascii", 4, 2) + "0 0 0\n1.5 0 0\n1.25 1 0\n0 1 -3.1\n4 0 1 2 3\n3 3 1 0\n");
-  EXPECT_EQ(mesh.positions, corners);
+  const scene::Mesh mesh =
+      load("a.ply",
+           ply_header("ascii", 4, 2) + "0 0 0\n1.5 0 0\n1.25 1 0\n0 1 -3.1\n4 0 1 2 3\n3 3 1 0\n");
+  EXPECT_EQ(mesh.positions, ply_corners);
   EXPECT_EQ(mesh.faces, faces);
 }
 
 TEST_F(PlyTest, TextNumbersAreRoundedCorrectly) {
-  const scene::Mesh mesh = load("a.ply", header("ascii", 3, 1) +
+  const scene::Mesh mesh = load("a.ply", ply_header("ascii", 3, 1) +
                                              "1.23456789 123.456789 -1234.56789\n"
                                              "0.1 16777217 3.4028235e38\n"
                                              "-1.17549435e-38 .5 5.\n3 0 1 2\n");
@@ -59,39 +35,39 @@ TEST_F(PlyTest, TextNumbersAreRoundedCorrectly) {
 
 TEST_F(PlyTest, TextWithCrLfAndBlankLines) {
   std::string text =
-      header("ascii", 4, 2) + "0 0 0\n1.5 0 0 \n1.25 1 0\n0 1 -3.1\n4 0 1 2 3\n3 3 1 0\n\n";
+      ply_header("ascii", 4, 2) + "0 0 0\n1.5 0 0 \n1.25 1 0\n0 1 -3.1\n4 0 1 2 3\n3 3 1 0\n\n";
   for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2) {
     text.replace(at, 1, "\r\n");
   }
   const scene::Mesh mesh = load("a.ply", text);
-  EXPECT_EQ(mesh.positions, corners);
+  EXPECT_EQ(mesh.positions, ply_corners);
   EXPECT_EQ(mesh.faces, faces);
 }
 
 TEST_F(PlyTest, BinaryAfterAHeaderWithCrLf) {
-  std::string head = header("binary_little_endian", 4, 2);
+  std::string head = ply_header("binary_little_endian", 4, 2);
   for (std::size_t at = 0; (at = head.find('\n', at)) != std::string::npos; at += 2) {
     head.replace(at, 1, "\r\n");
   }
-  const scene::Mesh mesh = load("a.ply", head + binary_body<float, std::uint8_t, int, false>());
-  EXPECT_EQ(mesh.positions, corners);
+  const scene::Mesh mesh = load("a.ply", head + ply_body<float, std::uint8_t, int, false>());
+  EXPECT_EQ(mesh.positions, ply_corners);
   EXPECT_EQ(mesh.faces, faces);
 }
 
 // A carriage return inside a row is a blank to one reader and the end of the row to the other.
 TEST_F(PlyTest, ReadersThatDisagreeAreNotTrusted) {
   if (!scene::can_read_gltf()) GTEST_SKIP() << "built without Assimp: there is no second reader";
-  expect_error("a.ply", header("ascii", 3, 1) + "0 0\r0\n1 0 0\n1 1 0\n3 0 1 2\n",
+  expect_error("a.ply", ply_header("ascii", 3, 1) + "0 0\r0\n1 0 0\n1 1 0\n3 0 1 2\n",
                ": Assimp and zkd read vertex 1 differently; the file is not trusted");
 }
 
 TEST_F(PlyTest, BinaryInBothByteOrders) {
-  const scene::Mesh little = load("a.ply", header("binary_little_endian", 4, 2) +
-                                               binary_body<float, std::uint8_t, int, false>());
+  const scene::Mesh little = load("a.ply", ply_header("binary_little_endian", 4, 2) +
+                                               ply_body<float, std::uint8_t, int, false>());
   const scene::Mesh big = load(
-      "b.ply", header("binary_big_endian", 4, 2) + binary_body<float, std::uint8_t, int, true>());
+      "b.ply", ply_header("binary_big_endian", 4, 2) + ply_body<float, std::uint8_t, int, true>());
   for (const scene::Mesh& mesh : {little, big}) {
-    EXPECT_EQ(mesh.positions, corners);
+    EXPECT_EQ(mesh.positions, ply_corners);
     EXPECT_EQ(mesh.faces, faces);
   }
 }
@@ -99,20 +75,20 @@ TEST_F(PlyTest, BinaryInBothByteOrders) {
 TEST_F(PlyTest, OtherTypes) {
   const auto load_as = [&](const std::string& head, const std::string& body) {
     const scene::Mesh mesh = load("a.ply", head + body);
-    EXPECT_EQ(mesh.positions, corners) << head;
+    EXPECT_EQ(mesh.positions, ply_corners) << head;
     EXPECT_EQ(mesh.faces, faces) << head;
   };
   const std::string little = "binary_little_endian";
-  load_as(header(little, 4, 2, "double", "uint ushort"),
-          binary_body<double, std::uint32_t, std::uint16_t, false>());
-  load_as(header(little, 4, 2, "float32", "uint8 uint32"),
-          binary_body<float, std::uint8_t, std::uint32_t, false>());
-  load_as(header(little, 4, 2, "float", "ushort short"),
-          binary_body<float, std::uint16_t, std::int16_t, false>());
-  load_as(header(little, 4, 2, "float", "char uchar"),
-          binary_body<float, std::int8_t, std::uint8_t, false>());
-  load_as(header("binary_big_endian", 4, 2, "float64", "int32 int"),
-          binary_body<double, std::int32_t, std::int32_t, true>());
+  load_as(ply_header(little, 4, 2, "double", "uint ushort"),
+          ply_body<double, std::uint32_t, std::uint16_t, false>());
+  load_as(ply_header(little, 4, 2, "float32", "uint8 uint32"),
+          ply_body<float, std::uint8_t, std::uint32_t, false>());
+  load_as(ply_header(little, 4, 2, "float", "ushort short"),
+          ply_body<float, std::uint16_t, std::int16_t, false>());
+  load_as(ply_header(little, 4, 2, "float", "char uchar"),
+          ply_body<float, std::int8_t, std::uint8_t, false>());
+  load_as(ply_header("binary_big_endian", 4, 2, "float64", "int32 int"),
+          ply_body<double, std::int32_t, std::int32_t, true>());
 }
 
 TEST_F(PlyTest, OtherPropertiesAndElements) {
@@ -128,7 +104,7 @@ TEST_F(PlyTest, OtherPropertiesAndElements) {
 }
 
 TEST_F(PlyTest, BrokenHeaders) {
-  const std::string good = header("ascii", 3, 1);
+  const std::string good = ply_header("ascii", 3, 1);
   const std::string body = "0 0 0\n1 0 0\n1 1 0\n3 0 1 2\n";
   const auto with = [&](const std::string& what, const std::string& by,
                         const std::string& message) {
@@ -162,7 +138,7 @@ TEST_F(PlyTest, BrokenHeaders) {
 }
 
 TEST_F(PlyTest, BrokenTextBodies) {
-  const std::string head = header("ascii", 3, 1);  // 10 lines
+  const std::string head = ply_header("ascii", 3, 1);  // 10 lines
   const auto body = [&](const std::string& text, const std::string& message) {
     expect_error("a.ply", head + text, message);
   };
@@ -186,8 +162,8 @@ TEST_F(PlyTest, BrokenTextBodies) {
 }
 
 TEST_F(PlyTest, BrokenBinaryBodies) {
-  const std::string head = header("binary_little_endian", 4, 2);
-  const std::string body = binary_body<float, std::uint8_t, int, false>();  // 48 + 17 + 13 bytes
+  const std::string head = ply_header("binary_little_endian", 4, 2);
+  const std::string body = ply_body<float, std::uint8_t, int, false>();  // 48 + 17 + 13 bytes
   const auto at = [&](std::size_t offset) {
     return ": byte " + std::to_string(head.size() + offset) + ": ";
   };
@@ -212,21 +188,30 @@ TEST_F(PlyTest, BrokenBinaryBodies) {
 }
 
 TEST_F(PlyTest, HugeCountsCostNothing) {
-  expect_error("a.ply", header("binary_little_endian", 2000000000, 1),
-               ": byte " + std::to_string(header("binary_little_endian", 2000000000, 1).size()) +
+  expect_error("a.ply", ply_header("binary_little_endian", 2000000000, 1),
+               ": byte " +
+                   std::to_string(ply_header("binary_little_endian", 2000000000, 1).size()) +
                    ": the file ends inside vertex 0 of 2000000000");
 }
 
 TEST_F(PlyTest, EveryTruncationIsAnError) {
   const std::string binary =
-      header("binary_little_endian", 4, 2) + binary_body<float, std::uint8_t, int, false>();
+      ply_header("binary_little_endian", 4, 2) + ply_body<float, std::uint8_t, int, false>();
   for (std::size_t length = 0; length < binary.size(); ++length) {
     EXPECT_THROW(load("a.ply", binary.substr(0, length)), scene::LoadError) << length;
   }
-  const std::string text = header("ascii", 3, 1) + "0 0 0\n1 0 0\n1 1 0\n3 0 1 2";
+  const std::string text = ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n1 1 0\n3 0 1 2";
   for (std::size_t length = 0; length < text.size(); ++length) {
     EXPECT_THROW(load("a.ply", text.substr(0, length)), scene::LoadError) << length;
   }
+}
+
+// Names from the header are told in errors, whatever is in them.
+TEST_F(PlyTest, ControlCharactersInAName) {
+  std::string text = ply_header("ascii", 0, 1);
+  text.replace(text.find("element vertex"), 0,
+               std::string("element a\0b\x1B[2J 2\nproperty int n\n", 33));
+  expect_error("a.ply", text + "1\n", ":13: the file ends before a?b?[2J 1 of 2");
 }
 
 }  // namespace

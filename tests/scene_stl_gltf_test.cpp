@@ -23,28 +23,11 @@ using GltfWithoutAssimpTest = SceneFiles;
 
 // ---- STL ----------------------------------------------------------------------------------------
 
-std::string binary_stl(const std::vector<vec3>& corners, const std::string& start = "made") {
-  std::string bytes = start;
-  bytes.resize(80, ' ');
-  bytes += little_endian(static_cast<std::uint32_t>(corners.size() / 3));
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    if (i % 3 == 0) bytes += std::string(12, '\0');
-    for (int a = 0; a < 3; ++a) bytes += little_endian(corners[i][a]);
-    if (i % 3 == 2) bytes += std::string(2, '\0');
-  }
-  return bytes;
-}
-
 const std::vector<vec3> two{{0, 0, 0}, {1, 0, 0},       {1, 1, 0},
                             {0, 0, 0}, {1, 1, 0.0625F}, {0, 1, -3.1F}};
 
-std::string facet(const std::string& a, const std::string& b, const std::string& c) {
-  return "  facet normal 0 0 1\n    outer loop\n      vertex " + a + "\n      vertex " + b +
-         "\n      vertex " + c + "\n    endloop\n  endfacet\n";
-}
-
-const std::string text_stl = "solid made by a test\n" + facet("0 0 0", "1 0 0", "1 1 0") +
-                             facet("0 0 0", "1 1 0.0625", "0 1 -3.1") + "endsolid made\n";
+const std::string text_stl = "solid made by a test\n" + stl_facet("0 0 0", "1 0 0", "1 1 0") +
+                             stl_facet("0 0 0", "1 1 0.0625", "0 1 -3.1") + "endsolid made\n";
 
 TEST_F(StlTest, TextAndBinary) {
   for (const scene::Mesh& mesh :
@@ -57,7 +40,7 @@ TEST_F(StlTest, TextAndBinary) {
 
 TEST_F(StlTest, SeveralSolids) {
   const scene::Mesh mesh = load(
-      "a.stl", text_stl + "solid\n" + facet("1.23456789 2 3", "4 5 6", "7 8 9") + "endsolid\n");
+      "a.stl", text_stl + "solid\n" + stl_facet("1.23456789 2 3", "4 5 6", "7 8 9") + "endsolid\n");
   ASSERT_EQ(mesh.faces.size(), 3U);
   EXPECT_EQ(mesh.positions[6], vec3(1.23456789F, 2.0F, 3.0F));
 }
@@ -111,53 +94,6 @@ TEST_F(StlTest, EveryTruncationIsAnError) {
 
 // ---- glTF ---------------------------------------------------------------------------------------
 
-/// Four positions and the indices 0 1 2, 0 2 3 as 16 bits: 48 + 12 bytes.
-std::string square_buffer() {
-  std::string bytes;
-  for (const float x : {0.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.0F, 1.0F, 1.0F, 0.0F, 0.0F, 1.0F, 0.25F}) {
-    bytes += little_endian(x);
-  }
-  for (const int i : {0, 1, 2, 0, 2, 3}) bytes += little_endian(static_cast<std::uint16_t>(i));
-  return bytes;
-}
-
-/// A scene of one square, twice: moved by (10, 0, 0) and, inside a node that doubles sizes, turned
-/// by a quarter round z. `uri` is `"uri":"...",` or nothing.
-std::string square_json(const std::string& uri) {
-  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],"nodes":[
-{"mesh":0,"translation":[10,0,0]},
-{"children":[2],"scale":[2,2,2]},
-{"mesh":0,"matrix":[0,1,0,0,-1,0,0,0,0,0,1,0,0,0,3,1]}],
-"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
-"accessors":[
-{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,0.25]},
-{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}],
-"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},
-{"buffer":0,"byteOffset":48,"byteLength":12}],
-"buffers":[{)" +
-         uri + R"("byteLength":60}]})";
-}
-
-std::string glb(std::string json, std::string binary) {
-  json.resize((json.size() + 3) / 4 * 4, ' ');
-  binary.resize((binary.size() + 3) / 4 * 4, '\0');
-  const auto number = [](std::size_t n) { return little_endian(static_cast<std::uint32_t>(n)); };
-  return "glTF" + number(2) + number(28 + json.size() + binary.size()) + number(json.size()) +
-         "JSON" + json + number(binary.size()) + std::string("BIN\0", 4) + binary;
-}
-
-std::string base64(const std::string& bytes) {
-  constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i + 2 < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      bits = (bits << 8) | static_cast<unsigned char>(bytes[i + k]);
-    for (int shift = 18; shift >= 0; shift -= 6) text += digits[(bits >> shift) & 63u];
-  }
-  return text;
-}
-
 void expect_two_squares(const scene::Mesh& mesh) {
   EXPECT_EQ(mesh.faces, (std::vector<uvec3>{{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}}));
   EXPECT_EQ(mesh.positions, (std::vector<vec3>{{10, 0, 0},
@@ -171,7 +107,7 @@ void expect_two_squares(const scene::Mesh& mesh) {
 }
 
 TEST_F(GltfTest, BufferInTheFileBesideItAndInText) {
-  expect_two_squares(load("a.glb", glb(square_json(""), square_buffer())));
+  expect_two_squares(load("a.glb", glb_file(square_json(""), square_buffer())));
   write("square.bin", square_buffer());
   expect_two_squares(load("b.gltf", square_json(R"("uri":"square.bin",)")));
   expect_two_squares(load("c.gltf", square_json(R"("uri":"data:application/octet-stream;base64,)" +
@@ -186,22 +122,22 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 TEST_F(GltfTest, StripsFansPointsAndLines) {
   const auto triangles = [&](const std::string& mode) {
-    return load("a.glb", glb(replaced(square_json(""), R"("indices":1)", R"("mode":)" + mode),
-                             square_buffer()))
+    return load("a.glb", glb_file(replaced(square_json(""), R"("indices":1)", R"("mode":)" + mode),
+                                  square_buffer()))
         .faces.size();
   };
   EXPECT_EQ(triangles("5"), 4U);
   EXPECT_EQ(triangles("6"), 4U);
   // Points beside triangles are passed over.
   const scene::Mesh mesh =
-      load("b.glb", glb(replaced(square_json(""), R"("primitives":[)",
-                                 R"("primitives":[{"attributes":{"POSITION":0},"mode":0},)"),
-                        square_buffer()));
+      load("b.glb", glb_file(replaced(square_json(""), R"("primitives":[)",
+                                      R"("primitives":[{"attributes":{"POSITION":0},"mode":0},)"),
+                             square_buffer()));
   EXPECT_EQ(mesh.faces.size(), 4U);
 }
 
 TEST_F(GltfTest, BrokenContainers) {
-  const std::string good = glb(square_json(""), square_buffer());
+  const std::string good = glb_file(square_json(""), square_buffer());
   const auto number = [](std::size_t n) { return little_endian(static_cast<std::uint32_t>(n)); };
   expect_error("a.glb", "glTF", ": byte 4: the file ends inside its GLB header");
   expect_error("a.glb", "no glTF at all", ": byte 0: a GLB file begins with 'glTF'");
@@ -226,7 +162,7 @@ TEST_F(GltfTest, BrokenJson) {
   const std::string good = square_json("");
   const auto with = [&](const std::string& what, const std::string& by,
                         const std::string& message) {
-    expect_error("a.glb", glb(replaced(good, what, by), square_buffer()), message);
+    expect_error("a.glb", glb_file(replaced(good, what, by), square_buffer()), message);
   };
   expect_error("a.gltf", "{\"asset\" 3}", ": byte 9: malformed JSON");
   expect_error("a.gltf", "[]", ": the file has no asset");
@@ -268,16 +204,44 @@ TEST_F(GltfTest, BrokenBuffers) {
   expect_error("d.gltf", square_json(""), ": buffers[0] has no uri");
 }
 
+TEST_F(GltfTest, BufferThatIsNoRegularFile) {
+  expect_error("a.gltf", square_json(R"("uri":"/dev/null",)"),
+               ": buffers[0]: /dev/null cannot be opened");
+}
+
+// Assimp overflowed the stack.
+TEST_F(GltfTest, NestedTooDeep) {
+  const auto nested = [&](std::size_t levels) {
+    const std::string extras =
+        "\"extras\":" + std::string(levels, '[') + std::string(levels, ']') + ",\"asset\"";
+    return glb_file(replaced(square_json(""), "\"asset\"", extras), square_buffer());
+  };
+  expect_two_squares(load("a.glb", nested(200)));
+  expect_error("b.glb", nested(1000000), ": the JSON has more than 256 levels");
+
+  const auto chain = [&](std::size_t nodes) {
+    std::string text = "\"nodes\":[";
+    for (std::size_t i = 1; i < nodes; ++i) text += "{\"children\":[" + std::to_string(i) + "]},";
+    const std::string json = replaced(square_json(""), "[0,1]", "[0]");
+    const std::size_t from = json.find("\"nodes\":[\n");
+    const std::size_t to = json.find("\"meshes\"");
+    return glb_file(json.substr(0, from) + text + "{\"mesh\":0}],\n" + json.substr(to),
+                    square_buffer());
+  };
+  EXPECT_EQ(load("c.glb", chain(1024)).faces.size(), 2U);
+  expect_error("d.glb", chain(1025), ": the node tree has more than 1024 levels");
+}
+
 TEST_F(GltfTest, NoTriangle) {
-  expect_error("a.glb", glb(replaced(square_json(""), "[0,1]", "[]"), square_buffer()),
+  expect_error("a.glb", glb_file(replaced(square_json(""), "[0,1]", "[]"), square_buffer()),
                ": contains no triangle");
   expect_error("b.glb",
-               glb(replaced(square_json(""), "\"indices\":1", "\"mode\":1"), square_buffer()),
+               glb_file(replaced(square_json(""), "\"indices\":1", "\"mode\":1"), square_buffer()),
                ": contains no triangle");
 }
 
 TEST_F(GltfTest, EveryTruncationIsAnError) {
-  const std::string text = glb(square_json(""), square_buffer());
+  const std::string text = glb_file(square_json(""), square_buffer());
   for (std::size_t length = 0; length < text.size(); ++length) {
     EXPECT_THROW(load("a.glb", text.substr(0, length)), scene::LoadError) << length;
   }

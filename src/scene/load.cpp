@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <string>
 
 #include "scene/source_file.hpp"
@@ -61,13 +62,17 @@ Mesh load_mesh(const std::filesystem::path& path) {
 
   // Each byte is read once, checked once and, in text formats, parsed once more by a library.
   Progress progress("loading " + path.filename().string(), error ? 0 : 3 * size);
-  SourceFile file(path, progress);
-  Mesh mesh = obj   ? load_obj(file, progress)
-              : ply ? load_ply(file, progress)
-              : stl ? load_stl(file, progress)
-                    : load_gltf(file, progress);
-  check(file, mesh);
-  return mesh;
+  try {
+    SourceFile file(path, progress);
+    Mesh mesh = obj   ? load_obj(file, progress)
+                : ply ? load_ply(file, progress)
+                : stl ? load_stl(file, progress)
+                      : load_gltf(file, progress);
+    check(file, mesh);
+    return mesh;
+  } catch (const std::bad_alloc&) {
+    throw LoadError(path.string() + ": there is not enough memory");
+  }
 }
 
 Box bounds(const Mesh& mesh) {

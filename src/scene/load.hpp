@@ -30,7 +30,8 @@ class LoadError : public std::runtime_error {
 ///
 /// Throws LoadError for a file that cannot be read, ends early, contradicts its own counts, has a
 /// coordinate that is not a finite number in float, has an index that names no vertex, or has no
-/// triangle at all. Draws a Progress.
+/// triangle at all, or for want of memory (std::bad_alloc where there is none for the message).
+/// Draws a Progress.
 [[nodiscard]] Mesh load_mesh(const std::filesystem::path& file);
 
 /// Whether this program was built with Assimp, without which a glTF file is a LoadError.

@@ -24,6 +24,11 @@ constexpr std::uint32_t glb_magic = 0x46546C67u;   // "glTF"
 constexpr std::uint32_t json_chunk = 0x4E4F534Au;  // "JSON"
 constexpr std::uint32_t bin_chunk = 0x004E4942u;   // "BIN"
 
+// Assimp calls itself for each level of the JSON and of the node tree, and would overflow the
+// stack.
+constexpr int most_json_levels = 256;
+constexpr std::uint32_t most_node_levels = 1024;
+
 std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::size_t size) {
   std::uint32_t value = 0;
   for (std::size_t i = size; i-- > 0;) {
@@ -82,8 +87,14 @@ class GltfCheck {
     } else if (file_.path().extension() == ".glb" || file_.path().extension() == ".GLB") {
       file_.fail_at_byte(0, "a GLB file begins with 'glTF'");
     }
+    const auto check_depth = [this](int depth, json::parse_event_t, json&) {
+      if (depth > most_json_levels) {
+        file_.fail("the JSON has more than " + std::to_string(most_json_levels) + " levels");
+      }
+      return true;
+    };
     try {
-      root_ = json::parse(text);
+      root_ = json::parse(text, check_depth);
     } catch (const json::parse_error& error) {
       const std::size_t at = error.byte > 0 ? error.byte - 1 : 0;
       file_.fail_at_byte(text_at + at, "malformed JSON");
@@ -151,10 +162,10 @@ class GltfCheck {
     }
     // As it stands, %20 and all: Assimp does not decode it either.
     const std::filesystem::path beside = file_.path().parent_path() / uri;
-    std::ifstream stream(beside, std::ios::binary);
-    if (!stream || std::filesystem::is_directory(beside)) {
-      file_.fail(name + ": " + beside.string() + " cannot be opened");
-    }
+    std::error_code error;  // a device or a pipe need not ever end
+    std::ifstream stream;
+    if (std::filesystem::is_regular_file(beside, error)) stream.open(beside, std::ios::binary);
+    if (!stream.is_open()) file_.fail(name + ": " + beside.string() + " cannot be opened");
     return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
   }
 
@@ -280,20 +291,27 @@ class GltfCheck {
     const std::uint64_t index = unsigned_or(root_, "scene", 0, "the file");
     const json& scene = at(scenes, index, "scenes[" + std::to_string(index) + "]");
     if (!scene.contains("nodes")) return;
-    std::vector<std::uint64_t> open;
+    struct Open {
+      std::uint64_t node;
+      std::uint32_t level;
+    };
+    std::vector<Open> open;
     for (const json& node : array_of(scene, "nodes"))
-      open.push_back(as_unsigned(node, "scene.nodes"));
+      open.push_back({as_unsigned(node, "scene.nodes"), 1});
     std::set<std::uint64_t> seen;
     while (!open.empty()) {
-      const std::uint64_t node_index = open.back();
+      const auto [node_index, level] = open.back();
       open.pop_back();
       const std::string name = "nodes[" + std::to_string(node_index) + "]";
       const json& node = at(array_of(root_, "nodes"), node_index, name);
+      if (level > most_node_levels) {
+        file_.fail("the node tree has more than " + std::to_string(most_node_levels) + " levels");
+      }
       if (!seen.insert(node_index).second) file_.fail(name + " has more than one parent");
       if (node.contains("mesh")) triangles_ += mesh_triangles(unsigned_of(node, "mesh", name));
       if (!node.contains("children")) continue;
       for (const json& child : array_of(node, "children")) {
-        open.push_back(as_unsigned(child, name + ".children"));
+        open.push_back({as_unsigned(child, name + ".children"), level + 1});
       }
     }
   }

@@ -12,6 +12,16 @@
 #include <system_error>
 
 namespace zkd::scene {
+namespace {
+
+// Names and words from a file may hold anything.
+std::string in_one_line(std::string message) {
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7F'; };
+  std::replace_if(message.begin(), message.end(), is_control, '?');
+  return message;
+}
+
+}  // namespace
 
 SourceFile::SourceFile(std::filesystem::path path, Progress& progress) : path_(std::move(path)) {
   std::error_code error;
@@ -51,15 +61,16 @@ std::size_t SourceFile::line_of(std::size_t offset) const {
 }
 
 void SourceFile::fail_in_line(std::size_t line, const std::string& message) const {
-  throw LoadError(path_.string() + ":" + std::to_string(line) + ": " + message);
+  throw LoadError(path_.string() + ":" + std::to_string(line) + ": " + in_one_line(message));
 }
 
 void SourceFile::fail_at_byte(std::size_t offset, const std::string& message) const {
-  throw LoadError(path_.string() + ": byte " + std::to_string(offset) + ": " + message);
+  throw LoadError(path_.string() + ": byte " + std::to_string(offset) + ": " +
+                  in_one_line(message));
 }
 
 void SourceFile::fail(const std::string& message) const {
-  throw LoadError(path_.string() + ": " + message);
+  throw LoadError(path_.string() + ": " + in_one_line(message));
 }
 
 const char* parse_coordinate(std::string_view token, float& value) {
@@ -88,10 +99,7 @@ const char* parse_coordinate(std::string_view token, float& value) {
 
 std::string in_quotes(std::string_view token) {
   constexpr std::size_t longest = 32;
-  std::string text(token.substr(0, longest));
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c < ' ' || c == '\x7F'; }, '?');
-  return "'" + text + (token.size() > longest ? "...'" : "'");
+  return "'" + std::string(token.substr(0, longest)) + (token.size() > longest ? "...'" : "'");
 }
 
 }  // namespace zkd::scene

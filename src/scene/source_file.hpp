@@ -29,7 +29,8 @@ class SourceFile {
   /// Which line the byte at `offset` is in, from 1. Lines end in LF, CR or CR LF.
   [[nodiscard]] std::size_t line_of(std::size_t offset) const;
 
-  /// Throws LoadError `path:line: message`.
+  /// Throws LoadError `path:line: message`. Control characters of a message become '?', here and
+  /// below.
   [[noreturn]] void fail_in_line(std::size_t line, const std::string& message) const;
   /// Throws LoadError `path: byte offset: message`.
   [[noreturn]] void fail_at_byte(std::size_t offset, const std::string& message) const;
@@ -48,7 +49,7 @@ class SourceFile {
 /// infinity are no coordinates.
 [[nodiscard]] const char* parse_coordinate(std::string_view token, float& value);
 
-/// A token for an error message: quoted, cut short, control characters as '?'.
+/// A token for an error message: quoted, cut short.
 [[nodiscard]] std::string in_quotes(std::string_view token);
 
 /// Polygons in a few numbers: two readings of a file that agree in all of them are the same.
