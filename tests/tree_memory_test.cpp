@@ -4,8 +4,6 @@
 // given back, and one clear error when it is refused.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <memory_resource>
 #include <new>
 #include <string>
@@ -19,51 +17,14 @@
 #include "support/hits.hpp"
 #include "support/memory.hpp"
 #include "support/meshes.hpp"
+#include "support/refusing_new.hpp"
 #include "verify/tree_hash.hpp"
-
-#if defined(__SANITIZE_ADDRESS__)
-#define ZKD_COUNTS_NEW 0
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define ZKD_COUNTS_NEW 0
-#endif
-#endif
-#ifndef ZKD_COUNTS_NEW
-#define ZKD_COUNTS_NEW 1
-#endif
-
-namespace {
-std::atomic<std::size_t> news{0};
-}
-
-#if ZKD_COUNTS_NEW
-// Every operator new of this program counts. Not inlined, so that a compiler sees pairs of new and
-// delete where there are some.
-[[gnu::noinline]] void* operator new(std::size_t bytes) {
-  ++news;
-  if (void* block = std::malloc(bytes == 0 ? 1 : bytes)) return block;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t bytes, std::align_val_t alignment) {
-  ++news;
-  const auto a = static_cast<std::size_t>(alignment);
-  if (void* block = std::aligned_alloc(a, (bytes + a - 1) / a * a + (bytes == 0 ? a : 0))) {
-    return block;
-  }
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* block) noexcept { std::free(block); }
-[[gnu::noinline]] void operator delete(void* block, std::size_t) noexcept { std::free(block); }
-[[gnu::noinline]] void operator delete(void* block, std::align_val_t) noexcept { std::free(block); }
-[[gnu::noinline]] void operator delete(void* block, std::size_t, std::align_val_t) noexcept {
-  std::free(block);
-}
-#endif
 
 namespace zkd {
 namespace {
 
 using test::CountingResource;
+using test::news;
 using verify::tree_hash;
 
 std::vector<test::NamedMesh> meshes() {
@@ -100,7 +61,7 @@ class NoDefaultMemory {
 // What the two tests below rest on.
 TEST(TreeMemory, OperatorNewIsCounted) {
   if (ZKD_COUNTS_NEW == 0) {
-    GTEST_SKIP() << "AddressSanitizer has operator new for itself: calls of it are not counted";
+    GTEST_SKIP() << "a sanitizer has operator new for itself: calls of it are not counted";
   }
   const std::size_t before = news;
   ::operator delete(::operator new(1));
@@ -209,29 +170,36 @@ TEST(TreeMemory, RequirementGrowsWithTheCount) {
 
 // ---- Refusals -----------------------------------------------------------------------------------
 
-// Refuses allocation 1, 2, 3, ... until `work` succeeds.
+// Refuses allocation 1, 2, 3, ..., alone and with all that follow, until `work` succeeds.
 template <class Work>
 void expect_every_refusal_is_survived(const Work& work) {
-  for (std::size_t refused = 1;; ++refused) {
-    ASSERT_LT(refused, 1000u) << "so many allocations?";
-    CountingResource memory;
-    memory.refuse_at = refused;
-    bool refusal = false;
-    try {
-      work(memory);
-    } catch (const Error& error) {
-      refusal = true;
-      EXPECT_EQ(error.code(), ErrorCode::out_of_memory) << error.what();
-      EXPECT_GT(error.offender(), 0u);
-      EXPECT_NE(std::string(error.what()).find(std::to_string(error.offender())), std::string::npos)
-          << error.what();
-    }
-    EXPECT_EQ(memory.live_bytes(), 0u) << "leaked when allocation " << refused << " was refused";
-    EXPECT_EQ(memory.live_blocks(), 0u);
-    EXPECT_FALSE(memory.misused());
-    if (!refusal) {
-      EXPECT_LT(memory.allocations(), refused) << "a refusal went unnoticed";
-      return;
+  for (const bool and_all_that_follow : {false, true}) {
+    for (std::size_t refused = 1;; ++refused) {
+      ASSERT_LT(refused, 1000u) << "so many allocations?";
+      CountingResource memory;
+      memory.refuse_at = refused;
+      memory.refuse_all_from_there = and_all_that_follow;
+      bool refusal = false;
+      try {
+        work(memory);
+      } catch (const Error& error) {
+        refusal = true;
+        EXPECT_EQ(error.code(), ErrorCode::out_of_memory) << error.what();
+        EXPECT_GT(error.offender(), 0u);
+        EXPECT_NE(std::string(error.what()).find(std::to_string(error.offender())),
+                  std::string::npos)
+            << error.what();
+      }
+      EXPECT_EQ(memory.live_bytes(), 0u) << "leaked when allocation " << refused << " was refused";
+      EXPECT_EQ(memory.live_blocks(), 0u);
+      EXPECT_FALSE(memory.misused());
+      if (!refusal) {
+        EXPECT_LT(memory.allocations(), refused) << "a refusal went unnoticed";
+        break;
+      }
+      memory.refuse_at = 0;
+      EXPECT_NO_THROW(work(memory)) << "the next try in the same memory";
+      EXPECT_EQ(memory.live_bytes(), 0u);
     }
   }
 }
@@ -274,15 +242,20 @@ TEST(TreeMemory, TooLittleMemoryIsAnError) {
   for (const References references : {References::once, References::all}) {
     CountingResource whole;
     (void)build({.threads = 2, .memory = &whole}, mesh.view(), options_for(references));
-    for (int tenths = 0; tenths < 10; ++tenths) {
+    const std::size_t need = whole.peak_bytes();
+    std::vector<std::size_t> limits = {need - 1, need};
+    for (std::size_t tenths = 0; tenths < 10; ++tenths) limits.push_back(need / 10 * tenths);
+    for (const std::size_t limit : limits) {
       CountingResource memory;
-      memory.limit = whole.peak_bytes() / 10 * static_cast<std::size_t>(tenths);
+      memory.limit = limit;
       try {
         (void)build({.threads = 2, .memory = &memory}, mesh.view(), options_for(references));
-        ADD_FAILURE() << tenths << " tenths were enough";
+        EXPECT_EQ(limit, need) << "less was enough";
       } catch (const Error& error) {
+        EXPECT_NE(limit, need) << "what was enough before";
         EXPECT_EQ(error.code(), ErrorCode::out_of_memory);
       }
+      EXPECT_LE(memory.peak_bytes(), limit);
       EXPECT_EQ(memory.live_bytes(), 0u);
     }
   }

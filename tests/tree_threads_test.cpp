@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Builds on the CPU that run at the same time.
+// Builds and queries on the CPU that run at the same time.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <thread>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <zkd/zkd.hpp>
 
 #include "scene/generate.hpp"
+#include "support/hits.hpp"
 #include "verify/tree_hash.hpp"
 
 namespace zkd {
@@ -41,6 +43,42 @@ TEST(TreeThreads, BuiltBySeveralThreadsAtOnce) {
     }
     for (std::thread& builder : builders) builder.join();
     for (const std::string& hash : got) EXPECT_EQ(hash, want);
+  }
+}
+
+// Some threads build while others shoot rays through one tree that they share, single rays and
+// spans.
+TEST(TreeThreads, BuildsAndQueriesAtOnce) {
+  const scene::Mesh mesh = scene::soup(20000, 25);
+  for (const References references : {References::once, References::all}) {
+    const Tree tree = build(cpu::Executor{}, mesh.view(), skipping(references));
+    const std::string want = tree_hash(tree.view());
+    const std::vector<Ray> rays = scene::rays_at_features(mesh, 2000, 26);
+    const std::vector<Hit> hits = test::closest(tree.view(), mesh.view(), rays, {.threads = 1});
+    std::vector<std::uint64_t> wrong(6, 0);
+    std::vector<std::thread> workers;
+    for (std::size_t i = 0; i < wrong.size(); ++i) {
+      workers.emplace_back([&, i] {
+        if (i % 3 == 0) {
+          const Tree again = build({.threads = 2}, mesh.view(), skipping(references));
+          wrong[i] += tree_hash(again.view()) != want ? 1 : 0;
+          wrong[i] += tree_hash(tree.clone().view()) != want ? 1 : 0;
+        } else if (i % 3 == 1) {
+          const std::vector<Hit> all =
+              test::closest(tree.view(), mesh.view(), rays, {.threads = 2});
+          wrong[i] += std::equal(all.begin(), all.end(), hits.begin(), test::same_bits) ? 0 : 1;
+        } else {
+          for (std::size_t r = 0; r < rays.size(); ++r) {
+            const Hit hit = test::or_miss(closest_hit(tree.view(), mesh.view(), rays[r]));
+            wrong[i] += test::same_bits(hit, hits[r]) ? 0 : 1;
+            wrong[i] += any_hit(tree.view(), mesh.view(), rays[r]) == test::is_hit(hits[r]) ? 0 : 1;
+          }
+        }
+      });
+    }
+    for (std::thread& worker : workers) worker.join();
+    EXPECT_EQ(wrong, std::vector<std::uint64_t>(6, 0)) << to_string(references);
+    EXPECT_EQ(tree_hash(tree.view()), want);
   }
 }
 

@@ -18,6 +18,8 @@ class CountingResource : public std::pmr::memory_resource {
  public:
   /// The allocation (from 1) that is refused; 0: none.
   std::size_t refuse_at = 0;
+  /// Whether all that follow it are refused as well.
+  bool refuse_all_from_there = false;
   /// Live bytes that may not be passed.
   std::size_t limit = std::numeric_limits<std::size_t>::max();
 
@@ -33,7 +35,9 @@ class CountingResource : public std::pmr::memory_resource {
   void* do_allocate(std::size_t bytes, std::size_t alignment) override {
     note_thread();
     ++allocations_;
-    if (allocations_ == refuse_at || bytes > limit || live_bytes_ > limit - bytes) {
+    const bool refused = refuse_at != 0 && (refuse_all_from_there ? allocations_ >= refuse_at
+                                                                  : allocations_ == refuse_at);
+    if (refused || bytes > limit || live_bytes_ > limit - bytes) {
       throw std::bad_alloc();
     }
     const std::size_t front = std::max(alignment, 2 * sizeof(std::size_t));
