@@ -24,6 +24,10 @@ zkd_packages=(
   glmark2-data                             # a Stanford Bunny for a machine without scenes
 )
 
+case $zkd_preset in  # these need Clang, its sanitizers and its OpenMP
+  fuzz | tsan) zkd_packages+=(clang libclang-rt-dev libomp-dev) ;;
+esac
+
 zkd_say() { printf 'zkd: %s\n' "$*" >&2; }
 
 # Runs "$@" with its output in the log; shows the last of it when it fails. On a terminal the last

@@ -27,12 +27,17 @@ function(zkd_own_target target)
     list(APPEND options -Werror)
   endif()
 
-  if(ZKD_SANITIZE)
-    # The first report ends the program, so that no test can pass over one.
+  # The first report ends the program, so that no test can pass over one.
+  if(ZKD_SANITIZE STREQUAL "thread")
+    set(sanitizers -fsanitize=thread -fno-omit-frame-pointer)
+  elseif(ZKD_SANITIZE)
     set(sanitizers -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
                    -fno-omit-frame-pointer)
-    list(APPEND options ${sanitizers})
-    target_link_options(${target} PUBLIC ${sanitizers})
+  endif()
+  list(APPEND options ${sanitizers})
+  target_link_options(${target} PUBLIC ${sanitizers})
+  if(ZKD_FUZZ)
+    list(APPEND options -fsanitize=fuzzer-no-link)  # coverage, for the fuzz targets to be led by
   endif()
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:${options}>")
 endfunction()
