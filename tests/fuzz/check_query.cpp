@@ -24,119 +24,181 @@ namespace {
 using test::is_hit;
 using test::same_bits;
 
-// One tree, its triangles, and the rays that are shot at it.
+constexpr Intersector intersectors[] = {Intersector::watertight, Intersector::fast,
+                                        Intersector::single_precision,
+                                        Intersector::double_precision, Intersector::exact};
+
+// One tree, its triangles, the rays that are shot at it, and how.
 struct Scene {
   const scene::Mesh& mesh;
   const Tree& tree;
   std::span<const Ray> rays;
+  Intersector intersector;
+
+  [[nodiscard]] std::vector<Hit> closest(
+      std::span<const Ray> other_rays,
+      cpu::InstructionSet set = cpu::InstructionSet::automatic) const {
+    return test::closest(tree.view(), mesh.view(), other_rays, {.threads = 1, .instructions = set},
+                         intersector);
+  }
 };
 
-[[noreturn]] void fail_at(const char* what, const Ray& ray, const Hit& got, const Hit& want) {
-  fail(std::string(what) + ": ray " + test::print(ray) + ": " + test::print(got) + " instead of " +
-       test::print(want));
+[[noreturn]] void fail_at(const char* what, Intersector intersector, const Ray& ray, const Hit& got,
+                          const Hit& want) {
+  fail(std::string(what) + ", " + to_string(intersector) + ", ray " + test::print(ray) + ": " +
+       test::print(got) + " instead of " + test::print(want));
 }
 
-std::vector<Hit> closest(const Scene& scene, std::span<const Ray> rays) {
-  return test::closest(scene.tree.view(), scene.mesh.view(), rays, {.threads = 1});
+void expect_same(const char* what, const Scene& scene, const std::vector<Hit>& got,
+                 std::span<const Hit> want) {
+  for (std::size_t i = 0; i < want.size(); ++i) {
+    if (!same_bits(got[i], want[i])) {
+      fail_at(what, scene.intersector, scene.rays[i], got[i], want[i]);
+    }
+  }
 }
 
 void check_against_brute_force(const Scene& scene, std::span<const Hit> want) {
   const TreeView& tree = scene.tree.view();
   const TriangleView triangles = scene.mesh.view();
   for (const auto set : {cpu::InstructionSet::portable, cpu::InstructionSet::avx2}) {
-    const cpu::Executor executor{.threads = 1, .instructions = set};
-    const std::vector<Hit> hits = test::closest(tree, triangles, scene.rays, executor);
+    expect_same("not as by brute force", scene, scene.closest(scene.rays, set), want);
     std::vector<std::uint8_t> occluded(scene.rays.size(), 7);
-    any_hit(executor, tree, triangles, scene.rays, occluded);
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      if (!same_bits(hits[i], want[i])) {
-        fail_at("not as by brute force", scene.rays[i], hits[i], want[i]);
-      }
+    any_hit({.threads = 1, .instructions = set}, tree, triangles, scene.rays, occluded, {},
+            scene.intersector);
+    for (std::size_t i = 0; i < want.size(); ++i) {
       if (occluded[i] != (is_hit(want[i]) ? 1 : 0)) {
-        fail_at("any hit is not closest hit", scene.rays[i], hits[i], want[i]);
+        fail_at("any hit is not closest hit", scene.intersector, scene.rays[i], {}, want[i]);
       }
     }
   }
   for (std::size_t i = 0; i < want.size(); ++i) {
-    const Hit hit = test::or_miss(closest_hit(tree, triangles, scene.rays[i]));
-    if (!same_bits(hit, want[i])) fail_at("a single ray", scene.rays[i], hit, want[i]);
-    if (any_hit(tree, triangles, scene.rays[i]) != is_hit(want[i])) {
-      fail_at("any hit of a single ray", scene.rays[i], hit, want[i]);
+    const Ray& ray = scene.rays[i];
+    const Hit hit = test::or_miss(closest_hit(tree, triangles, ray, scene.intersector));
+    if (!same_bits(hit, want[i])) fail_at("a single ray", scene.intersector, ray, hit, want[i]);
+    if (any_hit(tree, triangles, ray, scene.intersector) != is_hit(want[i])) {
+      fail_at("any hit of a single ray", scene.intersector, ray, {}, want[i]);
     }
   }
 }
 
 // Cut at the hit, an ulp beside it, before and behind: the nearer part with a hit has the hit.
 void check_intervals(const Scene& scene, std::span<const Hit> whole) {
+  std::vector<Ray> parts;
+  std::vector<std::size_t> of;
   for (std::size_t i = 0; i < whole.size(); ++i) {
     const Ray& ray = scene.rays[i];
     const float t = is_hit(whole[i]) ? whole[i].t : 0.25F;
     for (const float cut : {t, test::ulps(t, 1), test::ulps(t, -1), 0.5F * t, 2.0F * t}) {
       if (!(cut >= ray.t_min && cut <= ray.t_max)) continue;
-      std::vector<Ray> parts(2, ray);
-      parts[0].t_max = cut;
-      parts[1].t_min = cut;
-      const std::vector<Hit> hits = closest(scene, parts);
-      const Hit& nearest = is_hit(hits[0]) ? hits[0] : hits[1];
-      if (!same_bits(nearest, whole[i])) fail_at("split", parts[1], nearest, whole[i]);
+      parts.insert(parts.end(), 2, ray);
+      parts[parts.size() - 2].t_max = cut;
+      parts.back().t_min = cut;
+      of.push_back(i);
+    }
+  }
+  const std::vector<Hit> hits = scene.closest(parts);
+  for (std::size_t k = 0; k < of.size(); ++k) {
+    const Hit& nearest = is_hit(hits[2 * k]) ? hits[2 * k] : hits[2 * k + 1];
+    if (!same_bits(nearest, whole[of[k]])) {
+      fail_at("split", scene.intersector, parts[2 * k + 1], nearest, whole[of[k]]);
     }
   }
 }
 
-// Zero area behind the others, with coordinates that would change the scene if they counted.
-void check_invalid_triangle(const Scene& scene, std::span<const Hit> want) {
-  scene::Mesh more = scene.mesh;
-  const auto first = static_cast<std::uint32_t>(more.positions.size());
-  more.positions.insert(more.positions.end(),
+// Zero area and NaN behind the others, with coordinates that would change the scene if they
+// counted.
+scene::Mesh with_invalid_triangles(scene::Mesh mesh) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(),
                         {{3e37F, -2e30F, 1}, {std::numeric_limits<float>::quiet_NaN(), 0, 0}});
-  more.faces.emplace_back(first, first, 0);
-  more.faces.emplace_back(first, first + 1, 0);
-  const Tree tree = build(more.view(), scene.tree.options());
-  const std::vector<Hit> hits = closest({more, tree, scene.rays}, scene.rays);
-  for (std::size_t i = 0; i < hits.size(); ++i) {
-    if (!same_bits(hits[i], want[i])) {
-      fail_at("with invalid triangles added", scene.rays[i], hits[i], want[i]);
-    }
-  }
+  mesh.faces.emplace_back(first, first, 0);
+  mesh.faces.emplace_back(first, first + 1, 0);
+  return mesh;
 }
 
 bool same_box(const Box& a, const Box& b) {
   return std::equal(a.lo, a.lo + 3, b.lo) && std::equal(a.hi, a.hi + 3, b.hi);
 }
 
-// Without the last triangle: the same hit where that was not the answer. Only where the scene's
-// box, from which rays are made ready, is the same.
-void check_unneeded_triangle(const Scene& scene, std::span<const Hit> want) {
-  scene::Mesh fewer = scene.mesh;
-  if (fewer.faces.empty()) return;
-  fewer.faces.pop_back();
-  const auto last = static_cast<std::uint32_t>(fewer.faces.size());
-  const Tree tree = build(fewer.view(), scene.tree.options());
-  if (!same_box(tree.view().bounds(), scene.tree.view().bounds())) return;
-  const std::vector<Hit> hits = closest({fewer, tree, scene.rays}, scene.rays);
+// `fewer` lacks the last triangle: the same hit where that was not the answer.
+void check_unneeded_triangle(const Scene& fewer, std::span<const Hit> want) {
+  const auto last = static_cast<std::uint32_t>(fewer.mesh.faces.size());
+  const std::vector<Hit> hits = fewer.closest(fewer.rays);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (want[i].triangle == last) {
       if (is_hit(hits[i]) && hits[i].t < want[i].t) {
-        fail_at("nearer without a triangle", scene.rays[i], hits[i], want[i]);
+        fail_at("nearer without a triangle", fewer.intersector, fewer.rays[i], hits[i], want[i]);
       }
     } else if (!same_bits(hits[i], want[i])) {
-      fail_at("without a triangle behind the hit", scene.rays[i], hits[i], want[i]);
+      fail_at("without a triangle behind the hit", fewer.intersector, fewer.rays[i], hits[i],
+              want[i]);
+    }
+  }
+}
+
+float longest_component(const glm::vec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+// Rays that leave the hit forward, back and across: none hits the same triangle again.
+void check_spawned_rays(const Scene& scene, std::span<const Hit> hits) {
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!is_hit(hits[i])) continue;
+    const glm::uvec3 face = scene.mesh.faces[hits[i].triangle];
+    float largest = 0.0F;
+    for (int c = 0; c < 3; ++c) {
+      largest = std::max(largest, longest_component(scene.mesh.positions[face[c]]));
+    }
+    const glm::vec3 d = scene.rays[i].direction;
+    for (const glm::vec3& direction : {d, -d, glm::vec3(d.y, -d.z, d.x)}) {
+      // What offset_origin is for, and far from where floats end.
+      if (largest > 0x1p120F || longest_component(direction) > 0x1p100F * largest) continue;
+      Ray ray;
+      ray.origin = offset_origin(scene.mesh.view(), hits[i], direction, scene.intersector);
+      ray.direction = direction;
+      Hit again;
+      closest_hit_brute_force({.threads = 1}, scene.tree.view(),
+                              TriangleView(scene.mesh.positions, std::span(&face, 1)),
+                              std::span(&ray, 1), std::span(&again, 1), scene.intersector);
+      if (is_hit(again)) fail_at("a spawned ray", scene.intersector, ray, again, hits[i]);
+    }
+  }
+}
+
+// A hit whose t is too large for a float is none.
+Ray within_float(Ray ray) {
+  ray.t_max = std::min(ray.t_max, std::numeric_limits<float>::max());
+  return ray;
+}
+
+Hit to_hit(const verify::ExactHit& exact) {
+  if (!exact.hit) return {};
+  return {static_cast<float>(exact.t), 0.0F, 0.0F, exact.ties.front()};
+}
+
+// The oracle's triangle, and its t rounded to nearest (by way of a double: either of two).
+void check_exact(std::span<const Ray> rays, const verify::Oracle& oracle,
+                 std::span<const Hit> hits) {
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const verify::ExactHit exact = oracle.closest_hit(within_float(rays[i]));
+    const Hit want = to_hit(exact);
+    const double off = std::abs(static_cast<double>(hits[i].t) - exact.t);
+    const bool same_t = !exact.hit || off <= std::abs(static_cast<double>(want.t) - exact.t);
+    if (hits[i].triangle != want.triangle || !same_t) {
+      fail_at("not the oracle's", Intersector::exact, rays[i], hits[i], want);
     }
   }
 }
 
 void check_against_oracle(const Scene& scene, const verify::Oracle& oracle,
                           std::span<const Hit> hits) {
-  constexpr float largest = std::numeric_limits<float>::max();
   for (std::size_t i = 0; i < hits.size(); ++i) {
-    Ray ray = scene.rays[i];
-    ray.t_max = std::min(ray.t_max, largest);  // a hit whose t is too large for a float is none
+    const Ray ray = within_float(scene.rays[i]);
     const verify::Verdict verdict = verify::judge(oracle, scene.mesh.view(), ray, hits[i]);
     if (verdict.kind == verify::Verdict::correct || verdict.in_band) continue;
-    const verify::ExactHit exact = oracle.closest_hit(ray);
-    Hit want;
-    if (exact.hit) want = {static_cast<float>(exact.t), 0.0F, 0.0F, exact.ties.front()};
-    fail_at(verify::to_string(verdict.kind), ray, hits[i], want);
+    fail_at(verify::to_string(verdict.kind), scene.intersector, ray, hits[i],
+            to_hit(oracle.closest_hit(ray)));
   }
 }
 
@@ -145,28 +207,44 @@ bool is_power_of_two(float x) {
   return std::abs(std::frexp(x, &exponent)) == 0.5F;
 }
 
-float longest_component(const glm::vec3& v) {
-  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-}
-
 }  // namespace
 
 void check_queries(const scene::Mesh& mesh, const BuildOptions& options,
                    std::span<const Ray> rays) {
   const verify::Oracle oracle(mesh.view());
+  const scene::Mesh more = with_invalid_triangles(mesh);
+  scene::Mesh fewer = mesh;
+  if (!fewer.faces.empty()) fewer.faces.pop_back();
   for (const References references : {References::once, References::all}) {
     BuildOptions with = options;
     with.references = references;
     const Tree tree = build(mesh.view(), with);
-    const Scene scene{mesh, tree, rays};
-    const std::vector<Hit> want =
-        test::brute_force(tree.view(), mesh.view(), rays,
-                          {.threads = 1, .instructions = cpu::InstructionSet::portable});
-    check_against_brute_force(scene, want);
-    check_intervals(scene, want);
-    check_invalid_triangle(scene, want);
-    check_unneeded_triangle(scene, want);
-    if (references == References::once) check_against_oracle(scene, oracle, want);
+    const Tree tree_of_more = build(more.view(), with);
+    const Tree tree_of_fewer = build(fewer.view(), with);
+    // Rays are made ready from the scene's box: only where that is the same, answers must be.
+    const bool same_scene = same_box(tree_of_fewer.view().bounds(), tree.view().bounds());
+    std::vector<Hit> watertight;
+    for (const Intersector intersector : intersectors) {
+      const Scene scene{mesh, tree, rays, intersector};
+      const std::vector<Hit> want = test::brute_force(
+          tree.view(), mesh.view(), rays,
+          {.threads = 1, .instructions = cpu::InstructionSet::portable}, intersector);
+      check_against_brute_force(scene, want);
+      check_intervals(scene, want);
+      expect_same("with invalid triangles added", scene,
+                  Scene{more, tree_of_more, rays, intersector}.closest(rays), want);
+      if (same_scene) check_unneeded_triangle({fewer, tree_of_fewer, rays, intersector}, want);
+      if (references == References::all) continue;  // the answers are the same
+      check_spawned_rays(scene, want);
+      if (intersector == Intersector::exact) check_exact(rays, oracle, want);
+      if (intersector == Intersector::watertight) {
+        check_against_oracle(scene, oracle, want);
+        watertight = want;
+      }
+      if (intersector == Intersector::double_precision) {
+        expect_same("not as watertight", scene, want, watertight);
+      }
+    }
   }
 }
 
@@ -184,12 +262,10 @@ void check_exactly(const scene::Mesh& mesh, const BuildOptions& options,
     if (!is_power_of_two(longest_component(ray.direction))) continue;
     if (longest_component(ray.origin) > near) continue;
     const Hit hit = test::or_miss(closest_hit(tree.view(), mesh.view(), ray));
-    const verify::ExactHit exact = oracle.closest_hit(ray);
-    Hit want;
-    want.u = hit.u;
-    want.v = hit.v;
-    if (exact.hit) want = {static_cast<float>(exact.t), hit.u, hit.v, exact.ties.front()};
-    if (hit.triangle != want.triangle || hit.t != want.t) fail_at("not exact", ray, hit, want);
+    const Hit want = to_hit(oracle.closest_hit(ray));
+    if (hit.triangle != want.triangle || hit.t != want.t) {
+      fail_at("not exact", Intersector::watertight, ray, hit, want);
+    }
   }
 }
 

@@ -12,15 +12,17 @@
 
 namespace zkd::fuzz {
 
-/// Fails unless, for each ray and both kinds of references: every form of a query gives what brute
-/// force gives, bit for bit; any hit is closest hit; the interval may be split anywhere; a triangle
-/// that does not count changes nothing, and one that is not the answer changes nothing; and the
-/// exact oracle has nothing to say against the answer outside the error band.
+/// Fails unless, for each ray, both kinds of references and every intersector: every form of a
+/// query gives what brute force gives, bit for bit; any hit is closest hit; the interval may be
+/// split anywhere; a triangle that does not count changes nothing, and neither does one that is not
+/// the answer; a ray that is spawned at the hit does not hit the same triangle again. And unless
+/// `double_precision` is `watertight`, `exact` is the exact oracle, and the oracle has nothing to
+/// say against `watertight` outside the error band.
 void check_queries(const scene::Mesh& mesh, const BuildOptions& options, std::span<const Ray> rays);
 
 /// Fails unless rays on the lattice (bytes.hpp) whose longest component is a power of two, from not
-/// far away, hit exactly what the oracle says, and of several triangles there the first: every
-/// number on the way is exact.
+/// far away, hit exactly what the oracle says by `watertight`, and of several triangles there the
+/// first: every number on the way is exact.
 void check_exactly(const scene::Mesh& mesh, const BuildOptions& options, std::span<const Ray> rays);
 
 }  // namespace zkd::fuzz

@@ -31,16 +31,18 @@ using verify::same_bits;
 inline Hit or_miss(const std::optional<Hit>& hit) { return hit.value_or(Hit{}); }
 
 inline std::vector<Hit> closest(const TreeView& tree, const TriangleView& triangles,
-                                std::span<const Ray> rays, const cpu::Executor& executor = {}) {
+                                std::span<const Ray> rays, const cpu::Executor& executor = {},
+                                Intersector intersector = Intersector::watertight) {
   std::vector<Hit> hits(rays.size());
-  closest_hit(executor, tree, triangles, rays, hits);
+  closest_hit(executor, tree, triangles, rays, hits, {}, intersector);
   return hits;
 }
 
 inline std::vector<Hit> brute_force(const TreeView& tree, const TriangleView& triangles,
-                                    std::span<const Ray> rays, const cpu::Executor& executor = {}) {
+                                    std::span<const Ray> rays, const cpu::Executor& executor = {},
+                                    Intersector intersector = Intersector::watertight) {
   std::vector<Hit> hits(rays.size());
-  closest_hit_brute_force(executor, tree, triangles, rays, hits);
+  closest_hit_brute_force(executor, tree, triangles, rays, hits, intersector);
   return hits;
 }
 
