@@ -222,7 +222,7 @@ inline scene::Mesh repeated(const scene::Mesh& mesh, std::size_t faces) {
   return all;
 }
 
-/// Corners of any bits, indices in range but for one in so many.
+/// Corners of any bits; indices of any bits in one mesh of four.
 inline scene::Mesh any_mesh(Bytes& bytes) {
   scene::Mesh mesh;
   const std::uint32_t corners = bytes.below(24);
@@ -237,12 +237,15 @@ inline scene::Mesh any_mesh(Bytes& bytes) {
     }
     mesh.positions.push_back(p);
   }
+  if (corners > 0 && !bytes.one_in(4)) {
+    append_faces(bytes, mesh);
+    return mesh;
+  }
   while (bytes.left() > 0 && mesh.faces.size() < most_faces) {
     glm::uvec3 face(0);
     for (int c = 0; c < 3; ++c) {
       const std::uint32_t index = bytes.byte();
-      face[c] = index == 255 ? bytes.bits32() : index == 254 ? corners : index % (corners + 1);
-      if (index < 254 && corners > 0) face[c] = index % corners;
+      face[c] = index == 255 ? bytes.bits32() : index % (corners + 1);
     }
     mesh.faces.push_back(face);
   }

@@ -12,7 +12,7 @@
 
 namespace zkd::fuzz {
 
-/// Fails unless, for each ray, both kinds of references and every intersector: every form of a
+/// Fails unless, for each ray and every intersector: every form of a
 /// query gives what brute force gives, bit for bit; any hit is closest hit; the interval may be
 /// split anywhere; a triangle that does not count changes nothing, and neither does one that is not
 /// the answer; a ray that is spawned at the hit does not hit the same triangle again. And unless
