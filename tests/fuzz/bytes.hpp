@@ -237,6 +237,9 @@ inline scene::Mesh any_mesh(Bytes& bytes) {
     }
     mesh.positions.push_back(p);
   }
+  if (corners > 0 && bytes.one_in(4)) {  // rare among all floats as well
+    mesh.positions[bytes.below(corners)].y = std::numeric_limits<float>::infinity();
+  }
   if (corners > 0 && !bytes.one_in(4)) {
     append_faces(bytes, mesh);
     return mesh;

@@ -17,7 +17,7 @@ namespace zkd::fuzz {
 /// split anywhere; a triangle that does not count changes nothing, and neither does one that is not
 /// the answer; a ray that is spawned at the hit does not hit the same triangle again. And unless
 /// `double_precision` is `watertight`, `exact` is the exact oracle, and the oracle has nothing to
-/// say against `watertight` outside the error band.
+/// say against any of them outside its error band.
 void check_queries(const scene::Mesh& mesh, const BuildOptions& options, std::span<const Ray> rays);
 
 /// Fails unless rays on the lattice (bytes.hpp) whose longest component is a power of two, from not
