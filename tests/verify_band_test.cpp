@@ -209,6 +209,21 @@ TEST(VerifyBand, TIsHeldAgainstItsBound) {
   EXPECT_FALSE(in_bound(200, Intersector::single_precision));
 }
 
+// A ray from 2^108 that passes a vertex by 2^-120: found by fuzzing.
+TEST(VerifyBand, FromFurtherAwayThanADoubleResolves) {
+  const Scene scene(triangles({{0x1.9f87bap+3F, 0x1.14741ap+3F, -0x1.df057p+4F},
+                               {0x1.ec9804p+2F, 0x1.f45e5p+1F, 0x1.f1dc84p+4F},
+                               {0x1.b8a32p+1F, 0x1.07a1dep+4F, 0x1.fa3718p+4F}}));
+  Ray ray;
+  ray.origin = {0x1.e8aa04p+108F, 0x1.b395eep-120F, 0x1.ac8ad2p-74F};
+  ray.direction = {-0x1.e8aa04p+108F, 0x1.07a1dep+4F, 0x1.fa3718p+4F};
+  ASSERT_FALSE(scene.oracle.any_hit(ray));
+  expect(scene.verdict(ray, on(0, 1), Intersector::watertight), Verdict::phantom, true);
+  ray.direction.z *= 1.001F;
+  ASSERT_FALSE(scene.oracle.any_hit(ray));
+  expect(scene.verdict(ray, on(0, 1), Intersector::single_precision), Verdict::phantom, false);
+}
+
 TEST(VerifyBand, NothingIsHitThatHasNoArea) {
   const Scene scene(triangles({{-1, 0.1F, 1}, {1, 0.1F, 1}, {0.5F, 0.1F, 1}}));
   expect(scene.verdict(oblique({0.2F, 0.1F, 1}), on(0, 1)), Verdict::phantom, false);

@@ -40,24 +40,6 @@ double phantom_distance(const TriangleView& triangles, const Ray& ray, std::uint
   return error_of(std::max(0.0, -std::min({u, v, 1.0 - u - v})), 0x1p-24);
 }
 
-// What zkd/query.hpp promises of |t - exact t|, without the rounding of t to float; nothing where
-// it promises nothing.
-std::optional<double> promised(Intersector intersector, const Truth::Answer& exact) {
-  const double k = exact.condition;
-  switch (intersector) {
-    case Intersector::watertight:
-    case Intersector::double_precision:
-      return (9.0 * k + 14.0) * 0x1p-53 * exact.reach;
-    case Intersector::single_precision:
-      return (8.0 * k + 15.0) * 0x1p-24 * exact.reach;
-    case Intersector::exact:
-      return 0.0;
-    case Intersector::fast:
-      break;
-  }
-  return std::nullopt;
-}
-
 class Examiner {
  public:
   Examiner(const Exam& exam, std::span<const Hit> hits, std::size_t stride)
@@ -116,13 +98,13 @@ class Examiner {
   }
 
   void count_above_bound(const Hit& hit, const Truth::Answer& exact, std::size_t ray) {
-    const std::optional<double> bound = promised(*exam_.intersector, exact);
-    if (!bound) return;
+    const double bound = verify::stated_t_bound(*exam_.intersector, exact.condition, exact.reach);
+    if (std::isinf(bound) && *exam_.intersector == Intersector::fast) return;  // it states none
     const auto t = static_cast<double>(hit.t);
     // Half a unit of the rounding to float, and that of the exact t to double.
     const double rounding =
         0.5 * float_ulp(std::max(std::abs(t), std::abs(exact.t))) + 0x1p-52 * std::abs(exact.t);
-    const bool above = !(std::abs(t - exact.t) <= *bound + rounding);
+    const bool above = !(std::abs(t - exact.t) <= bound + rounding);
     score_.above_bound = score_.above_bound.value_or(0) + (above ? 1 : 0);
     if (above && !score_.first_above_bound) score_.first_above_bound = exam_.truth.rays()[ray];
   }

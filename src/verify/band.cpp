@@ -20,6 +20,8 @@
 #include <optional>
 #include <vector>
 
+#include <gmpxx.h>
+
 #include "verify/exact.hpp"
 
 namespace zkd::verify {
@@ -45,7 +47,6 @@ Long length(const LongPoint& a) { return std::sqrt(dot(a, a)); }
 LongPoint difference(const LongPoint& a, const LongPoint& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
-LongPoint wide(const Point& p) { return {p[0], p[1], p[2]}; }
 
 Point point(const glm::vec3& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
@@ -56,6 +57,17 @@ double float_ulp(double x) {
   int exponent = 0;
   std::frexp(x, &exponent);
   return std::ldexp(1.0, x == 0.0 ? -149 : std::max(exponent - 24, -149));
+}
+
+// Enough digits that an origin at the largest float, moved next to a scene of denormal size, is
+// exact to a double and more.
+mpf_class many_digits(double x) { return mpf_class(x, 768); }
+
+// To the digits of a Long: two doubles.
+Long rounded(const mpf_class& x) {
+  const double most = x.get_d();
+  const mpf_class rest = x - most;
+  return Long{most} + Long{rest.get_d()};
 }
 
 // A number and the magnitude below which its sign is excused.
@@ -78,31 +90,33 @@ struct Judged {
         d(point(caller.direction)),
         lost(bounds.unit == 0.0 ? 0.0 : 4.0 * oracle.lost_by_scaling()) {
     double away = 0.0;
-    LongPoint to_centre{};
     for (std::size_t a = 0; a < 3; ++a) {
       if (std::abs(d[a]) > std::abs(d[z])) z = a;
       away = std::max({away, oracle.box().lo[a] - o[a], o[a] - oracle.box().hi[a]});
-      to_centre[a] = 0.5L * (Long{oracle.box().lo[a]} + Long{oracle.box().hi[a]}) - Long{o[a]};
     }
     if (away > far_origin * oracle.largest_coordinate()) {
-      shift = dot(to_centre, wide(d)) / dot(wide(d), wide(d));
+      mpf_class projected = many_digits(0.0);
+      mpf_class squared = many_digits(0.0);
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double centre = 0.5 * oracle.box().lo[a] + 0.5 * oracle.box().hi[a];
+        projected += (many_digits(centre) - o[a]) * d[a];
+        squared += many_digits(d[a]) * d[a];
+      }
+      shift = projected / squared;
       // The moved origin is rounded to a double, at most 16 times the largest coordinate out.
       if (bounds.unit != 0.0) lost += 2.0 * 16.0 * 0x1p-53 * oracle.largest_coordinate();
     }
   }
 
-  // Coordinate `axis` of a point from the moved origin: without an error, but for its own rounding
-  // (Knuth's sum, Dekker's product).
+  // Coordinate `axis` of a point from the moved origin, to the last digit of a Long.
   [[nodiscard]] Long from_origin(double x, std::size_t axis) const {
-    const Long base = Long{x} - Long{o[axis]};
-    const Long subtracted = Long{x} - base;
-    const Long base_rest = (Long{x} - (base + subtracted)) - (Long{o[axis]} - subtracted);
-    const Long product = shift * Long{d[axis]};
-    const Long product_rest = std::fma(shift, Long{d[axis]}, -product);
-    const Long difference = base - product;
-    const Long removed = base - difference;
-    const Long difference_rest = (base - (difference + removed)) - (product - removed);
-    return difference + (difference_rest + (base_rest - product_rest));
+    if (!shift) return Long{x} - Long{o[axis]};
+    return rounded(many_digits(x) - o[axis] - *shift * d[axis]);
+  }
+
+  // How far s lies from the moved origin along the ray.
+  [[nodiscard]] Long from_origin_along(double s) const {
+    return shift ? rounded(many_digits(s) - *shift) : Long{s};
   }
 
   const Ray& ray;
@@ -110,9 +124,9 @@ struct Judged {
   double underflow;
   Point o;
   Point d;
-  std::size_t z = 0;  // the axis along which d is longest
-  Long shift = 0.0L;  // how far along the ray its origin is brought
-  double lost;        // how far scaling and moving may have moved a sheared coordinate
+  std::size_t z = 0;               // the axis along which d is longest
+  std::optional<mpf_class> shift;  // how far along the ray its origin is brought, if it is
+  double lost;                     // how far scaling and moving may have moved a sheared coordinate
 };
 
 // What decides about one ray and one triangle.
@@ -172,11 +186,13 @@ Facts examine(const Judged& judged, const Corners& corners) {
     }
   }
   const double product = bounds.product * bounds.unit;
+  const auto side_error = [&](std::size_t i) {
+    const double moved_corner = judged.lost * 2.0 * (side[i][0] + side[i][1] + side[i][2]);
+    return product * terms(corner[0].size, side[i]) + moved_corner;
+  };
   const double product_error[3] = {
-      product * terms(corner[0].size, side[0]),
-      product * (terms(corner[0].size, side[0]) + terms(corner[0].size, side[1]) +
-                 terms(side[0], side[1])),
-      product * terms(corner[0].size, side[1])};
+      side_error(0), side_error(0) + side_error(1) + product * terms(side[0], side[1]),
+      side_error(1)};
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t j = (i + 1) % 3;
     const Corner& a = corner[i];
@@ -246,7 +262,8 @@ Long distance(const LongPoint& q, const LongPoint (&corners)[3]) {
 }
 
 // The least distance from the triangle of a point o + s * d, s being what rounds to the float t.
-// Distance is convex along a line: by ternary search.
+// Distance is convex along a line: by ternary search, a thousand thirds being more than the digits
+// of any two floats span.
 Long distance_of_answer(const Judged& judged, double t, const Corners& corners) {
   LongPoint seen[3];
   for (std::size_t i = 0; i < 3; ++i) {
@@ -258,10 +275,10 @@ Long distance_of_answer(const Judged& judged, double t, const Corners& corners) 
   const auto at = [&](Long along) {
     return distance({along * judged.d[0], along * judged.d[1], along * judged.d[2]}, seen);
   };
-  const Long answered = Long{t} - judged.shift;
+  const Long answered = judged.from_origin_along(t);
   Long lo = answered - 0.5L * Long{float_ulp(t)};
   Long hi = answered + 0.5L * Long{float_ulp(t)};
-  for (int i = 0; i < 200 && lo < hi; ++i) {
+  for (int i = 0; i < 1000 && lo < hi; ++i) {
     const Long third = (hi - lo) / 3.0L;
     if (at(lo + third) <= at(hi - third))
       hi -= third;
@@ -310,6 +327,21 @@ Bounds bounds_of(Intersector intersector) noexcept {
       break;
   }
   return {};
+}
+
+double stated_t_bound(Intersector intersector, double condition, double reach) noexcept {
+  switch (intersector) {
+    case Intersector::watertight:
+    case Intersector::double_precision:
+      return (9.0 * condition + 25.0) * 0x1p-53 * reach;
+    case Intersector::single_precision:
+      return (13.0 * condition + 26.0) * 0x1p-24 * reach;
+    case Intersector::fast:
+      return std::numeric_limits<double>::infinity();
+    case Intersector::exact:
+      break;
+  }
+  return 0.0;
 }
 
 const char* to_string(Verdict::Kind kind) noexcept {

@@ -37,6 +37,11 @@ struct Bounds {
 /// All zero for Intersector::exact.
 [[nodiscard]] Bounds bounds_of(Intersector intersector) noexcept;
 
+/// What zkd/query.hpp states of |t - exact t| |d|, before t is rounded to a float: for
+/// `condition`, k there, and `reach`, R. Infinite where it states nothing.
+[[nodiscard]] double stated_t_bound(Intersector intersector, double condition,
+                                    double reach) noexcept;
+
 /// One answer held against the oracle.
 struct Verdict {
   enum Kind {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <stdexcept>
 #include <string>
 
@@ -86,8 +87,9 @@ Summary check(const Oracle& oracle, const TriangleView& triangles, std::span<con
   std::atomic<std::size_t> next{0};
   std::atomic<std::uint64_t> done{0};
   Part all;
+  std::exception_ptr failure;  // no exception may leave a parallel region: the last one, thrown on
 #pragma omp parallel num_threads(threads > 0 ? threads : omp_get_max_threads())
-  {
+  try {
     Part part;
     for (std::size_t block = next++; block < blocks; block = next++) {
       const std::size_t begin = block * block_size;
@@ -101,7 +103,12 @@ Summary check(const Oracle& oracle, const TriangleView& triangles, std::span<con
     }
 #pragma omp critical(zkd_verify_check)
     add(all, part);
+  } catch (...) {
+#pragma omp critical(zkd_verify_check)
+    failure = std::current_exception();
+    next = blocks;
   }
+  if (failure) std::rethrow_exception(failure);
 
   Summary& summary = all.summary;
   summary.rays = rays.size();

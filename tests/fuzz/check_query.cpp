@@ -28,10 +28,6 @@ constexpr Intersector intersectors[] = {Intersector::watertight, Intersector::fa
                                         Intersector::single_precision,
                                         Intersector::double_precision, Intersector::exact};
 
-bool is_single(Intersector intersector) {
-  return intersector == Intersector::fast || intersector == Intersector::single_precision;
-}
-
 // One tree, its triangles, the rays that are shot at it, and how.
 struct Scene {
   const scene::Mesh& mesh;
@@ -145,17 +141,8 @@ float longest_component(const glm::vec3& v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
-float largest_coordinate(const Box& box) {
-  float largest = 0.0F;
-  for (int a = 0; a < 3; ++a) {
-    largest = std::max({largest, std::abs(box.lo[a]), std::abs(box.hi[a])});
-  }
-  return largest;
-}
-
 // Rays that leave the hit forward, back and across: none hits the same triangle again.
 void check_spawned_rays(const Scene& scene, std::span<const Hit> hits) {
-  const float scene_size = largest_coordinate(scene.tree.view().bounds());
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (!is_hit(hits[i])) continue;
     const glm::uvec3 face = scene.mesh.faces[hits[i].triangle];
@@ -163,8 +150,6 @@ void check_spawned_rays(const Scene& scene, std::span<const Hit> hits) {
     for (int c = 0; c < 3; ++c) {
       largest = std::max(largest, longest_component(scene.mesh.positions[face[c]]));
     }
-    // Single precision has no digits left for triangles that are so much smaller than the scene.
-    if (is_single(scene.intersector) && largest < 0x1p-40F * scene_size) continue;
     const glm::vec3 d = scene.rays[i].direction;
     for (const glm::vec3& direction : {d, -d, glm::vec3(d.y, -d.z, d.x)}) {
       // What offset_origin is for, and far from where floats end.
@@ -208,11 +193,8 @@ void check_exact(std::span<const Ray> rays, const verify::Oracle& oracle,
 
 void check_against_oracle(const Scene& scene, const verify::Oracle& oracle,
                           std::span<const Hit> hits) {
-  const float furthest = 0x1p30F * largest_coordinate(scene.tree.view().bounds());
   for (std::size_t i = 0; i < hits.size(); ++i) {
     const Ray ray = within_float(scene.rays[i]);
-    // From further away the band itself rounds: not judged, until it does not.
-    if (longest_component(ray.origin) > furthest) continue;
     const verify::Verdict verdict =
         verify::judge(oracle, scene.mesh.view(), ray, hits[i], scene.intersector);
     if (!verdict.t_in_bound) {
