@@ -619,6 +619,15 @@ TEST(CudaDevice, BuildsThatNameNoExecutorComeHere) {
 
 // ---- Rays ---------------------------------------------------------------------------------------
 
+TEST(CudaDevice, ExactIsOfTheHostOnly) {
+  const test::Caught error = test::caught([] {
+    closest_hit(cuda::Executor{}, TreeView{}, TriangleView{}, std::span<const Ray>(),
+                std::span<Hit>(), {}, Intersector::exact);
+  });
+  EXPECT_TRUE(error.thrown);
+  EXPECT_EQ(error.code, ErrorCode::unsupported_option);
+}
+
 TEST(CudaDevice, ShorterSpansEndTheWork) {
   const scene::Mesh mesh = scene::sphere(2);
   const cuda::Tree tree = build(cuda::Executor{}, mesh.view());

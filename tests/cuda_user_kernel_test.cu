@@ -84,6 +84,45 @@ void expect_bits_of_the_host(const cuda::Tree& tree, const Tree& host,
   }
 }
 
+struct Bounce {
+  Hit hit;
+  glm::vec3 origin;  // of a ray that goes on from the hit
+};
+
+template <Intersector intersector>
+__global__ void __launch_bounds__(block_size)
+    trace_and_leave(TreeView tree, TriangleView triangles, const Ray* rays, Bounce* bounces,
+                    std::uint32_t count) {
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= count) return;
+  bounces[i].hit = device::closest_hit<intersector>(tree, triangles, rays[i]);
+  if (bounces[i].hit.triangle != no_triangle)
+    bounces[i].origin =
+        device::offset_origin<intersector>(triangles, bounces[i].hit, rays[i].direction);
+}
+
+template <Intersector intersector>
+void expect_same_bounces(const cuda::Tree& tree, const Tree& host, const TriangleView& triangles,
+                         const std::vector<Ray>& rays) {
+  SCOPED_TRACE(to_string(intersector));
+  const auto count = static_cast<std::uint32_t>(rays.size());
+  const Array<Ray> uploaded = test::upload(rays);
+  Array<Bounce> bounces(count);
+  trace_and_leave<intersector><<<(count + block_size - 1) / block_size, block_size>>>(
+      tree.view(), tree.triangles(), uploaded.data(), std::span<Bounce>(bounces).data(), count);
+  test::require(cudaGetLastError());
+  test::require(cudaDeviceSynchronize());
+  const std::vector<Bounce> got = bounces.download();
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Hit want = test::or_miss(closest_hit(host.view(), triangles, rays[i], intersector));
+    ASSERT_TRUE(same_bits(got[i].hit, want)) << "ray " << i << " " << print(rays[i]) << ": "
+                                             << print(got[i].hit) << " instead of " << print(want);
+    if (!test::is_hit(want)) continue;
+    ASSERT_EQ(got[i].origin, offset_origin(triangles, want, rays[i].direction, intersector))
+        << "from ray " << i << " " << print(rays[i]);
+  }
+}
+
 class CudaUserKernel : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(CudaUserKernel, GivesTheBitsOfTheHost) {
@@ -98,8 +137,13 @@ TEST_P(CudaUserKernel, GivesTheBitsOfTheHost) {
       const test::UploadedTriangles<Array> uploaded(m.mesh.view());
       const cuda::Tree tree = build(test::executor(), uploaded, test::with_room(uploaded, options));
       const Tree host = tree.to_host();
-      expect_bits_of_the_host(tree, host, m.mesh.view(),
-                              test::RayMaker(m.mesh, host.view(), seed).all_kinds(1200));
+      const std::vector<Ray> rays = test::RayMaker(m.mesh, host.view(), seed).all_kinds(1200);
+      expect_bits_of_the_host(tree, host, m.mesh.view(), rays);
+      if (HasFatalFailure()) return;
+      expect_same_bounces<Intersector::watertight>(tree, host, m.mesh.view(), rays);
+      expect_same_bounces<Intersector::fast>(tree, host, m.mesh.view(), rays);
+      expect_same_bounces<Intersector::single_precision>(tree, host, m.mesh.view(), rays);
+      expect_same_bounces<Intersector::double_precision>(tree, host, m.mesh.view(), rays);
       if (HasFatalFailure()) return;
     }
   }

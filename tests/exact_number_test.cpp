@@ -10,7 +10,7 @@
 
 #include <gmpxx.h>
 
-#include "core/exact_determinant.hpp"
+#include "core/exact/determinant.hpp"
 #include "support/random.hpp"
 
 namespace zkd::core {

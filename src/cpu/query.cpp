@@ -9,7 +9,7 @@
 #include <zkd/traversal/offset.hpp>
 #include <zkd/traversal/traverse.hpp>
 
-#include "core/exact_intersect.hpp"
+#include "core/exact/intersect.hpp"
 #include "cpu/box_test.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/instruction_set.hpp"

@@ -23,3 +23,20 @@ extern "C" __global__ void two_bounces(zkd::TreeView tree, zkd::TriangleView tri
   shadow.t_max = hit.t;
   occluded[i] = zkd::device::any_hit(tree, triangles, shadow) ? 1 : 0;
 }
+
+template <zkd::Intersector intersector>
+__global__ void trace_with(zkd::TreeView tree, zkd::TriangleView triangles, zkd::Ray* rays,
+                           zkd::Hit* hits) {
+  const unsigned i = blockIdx.x * blockDim.x + threadIdx.x;
+  hits[i] = zkd::device::closest_hit<intersector>(tree, triangles, rays[i]);
+  rays[i].origin = zkd::device::offset_origin<intersector>(triangles, hits[i], rays[i].direction);
+}
+
+template __global__ void trace_with<zkd::Intersector::fast>(zkd::TreeView, zkd::TriangleView,
+                                                            zkd::Ray*, zkd::Hit*);
+template __global__ void trace_with<zkd::Intersector::single_precision>(zkd::TreeView,
+                                                                        zkd::TriangleView,
+                                                                        zkd::Ray*, zkd::Hit*);
+template __global__ void trace_with<zkd::Intersector::double_precision>(zkd::TreeView,
+                                                                        zkd::TriangleView,
+                                                                        zkd::Ray*, zkd::Hit*);

@@ -12,7 +12,7 @@
 #include <zkd/traversal/ray.hpp>
 #include <zkd/traversal/triangle.hpp>
 
-#include "core/exact_determinant.hpp"
+#include "core/exact/determinant.hpp"
 
 namespace zkd::core {
 

@@ -9,7 +9,7 @@
 
 #include <zkd/traversal/arithmetic.hpp>
 
-#include "core/exact_number.hpp"
+#include "core/exact/integer.hpp"
 
 namespace zkd::core {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Intersector::exact: see exact_intersect.hpp. Out of line, so that a walk stays small: few
+// Intersector::exact: see intersect.hpp. Out of line, so that a walk stays small: few
 // triangles get here.
-#include "core/exact_intersect.hpp"
+#include "core/exact/intersect.hpp"
 
 namespace zkd::core {
 namespace {
