@@ -4,18 +4,18 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
-#include <new>
+#include <optional>
 #include <string>
 
 #include <zkd/error.hpp>
 
 #include "contender.hpp"
 #include "cuda.hpp"
+#include "exit_status.hpp"
 #include "json.hpp"
 #include "machine.hpp"
 #include "options.hpp"
@@ -27,25 +27,6 @@
 
 namespace zkd::bench {
 namespace {
-
-enum ExitStatus { done = 0, check_failed = 1, bad_input = 2, device_failure = 3 };
-
-int fail(ExitStatus status, std::string message) {
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::cerr << "zkd-bench: error: " << message << std::endl;
-  return status;
-}
-
-ExitStatus status_of(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::out_of_memory:
-    case ErrorCode::backend_unavailable:
-    case ErrorCode::device_failure:
-      return device_failure;
-    default:
-      return bad_input;
-  }
-}
 
 // Where zkd builds, and why not on CUDA if that was asked for.
 struct Where {
@@ -163,14 +144,8 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace zkd::bench;
-  try {
+  return exit_status_of("zkd-bench", [&]() -> int {
     const std::optional<Options> options = parse_options(argc, argv);
     return options ? run(*options) : done;
-  } catch (const zkd::Error& error) {
-    return fail(status_of(error.code()), error.what());
-  } catch (const std::bad_alloc&) {
-    return fail(device_failure, "out of memory");
-  } catch (const std::exception& error) {
-    return fail(bad_input, error.what());
-  }
+  });
 }

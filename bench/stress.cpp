@@ -8,29 +8,23 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <iostream>
-#include <new>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <zkd/config.hpp>
 
+#include "exit_status.hpp"
 #include "scene/progress.hpp"
 #include "stress/run.hpp"
+#include "usage_error.hpp"
 
 namespace zkd::stress {
 namespace {
 
-enum ExitStatus { done = 0, row_failed = 1, bad_input = 2, out_of_memory = 3 };
-
-class UsageError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+using bench::UsageError;
 
 struct Options {
   Setting setting;
@@ -162,26 +156,15 @@ int run(const Options& options) {
             << ", missed " << sum.outside.missed << ", phantom " << sum.outside.phantom
             << ", wrong " << sum.outside.wrong_triangle << ", in_band " << sum.in_band << "; "
             << seconds << " s, seed " << options.setting.seed << std::endl;
-  return totals.failed > 0 ? row_failed : done;
-}
-
-int fail(ExitStatus status, std::string message) {
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::cerr << "zkd-stress: error: " << message << std::endl;
-  return status;
+  return totals.failed > 0 ? bench::check_failed : bench::done;
 }
 
 }  // namespace
 }  // namespace zkd::stress
 
 int main(int argc, char** argv) {
-  using namespace zkd::stress;
-  try {
-    const std::optional<Options> options = parse(argc, argv);
-    return options ? run(*options) : done;
-  } catch (const std::bad_alloc&) {
-    return fail(out_of_memory, "out of memory");
-  } catch (const std::exception& error) {
-    return fail(bad_input, error.what());
-  }
+  return zkd::bench::exit_status_of("zkd-stress", [&]() -> int {
+    const std::optional<zkd::stress::Options> options = zkd::stress::parse(argc, argv);
+    return options ? zkd::stress::run(*options) : zkd::bench::done;
+  });
 }

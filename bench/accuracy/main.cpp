@@ -8,15 +8,15 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <new>
+#include <optional>
 #include <string>
 
 #include <zkd/error.hpp>
 
+#include "exit_status.hpp"
 #include "machine.hpp"
 #include "options.hpp"
 #include "pictures.hpp"
@@ -28,25 +28,6 @@
 
 namespace zkd::bench::accuracy {
 namespace {
-
-enum ExitStatus { done = 0, check_failed = 1, bad_input = 2, device_failure = 3 };
-
-int fail(ExitStatus status, std::string message) {
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::cerr << "zkd-accuracy: error: " << message << std::endl;
-  return status;
-}
-
-ExitStatus status_of(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::out_of_memory:
-    case ErrorCode::backend_unavailable:
-    case ErrorCode::device_failure:
-      return device_failure;
-    default:
-      return bad_input;
-  }
-}
 
 std::vector<TestScene> load_scenes(const Options& options) {
   std::vector<scene::SceneInfo> infos;
@@ -173,14 +154,8 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace zkd::bench::accuracy;
-  try {
+  return zkd::bench::exit_status_of("zkd-accuracy", [&]() -> int {
     const std::optional<Options> options = parse_options(argc, argv);
-    return options ? run(*options) : done;
-  } catch (const zkd::Error& error) {
-    return fail(status_of(error.code()), error.what());
-  } catch (const std::bad_alloc&) {
-    return fail(device_failure, "out of memory");
-  } catch (const std::exception& error) {
-    return fail(bad_input, error.what());
-  }
+    return options ? run(*options) : zkd::bench::done;
+  });
 }
