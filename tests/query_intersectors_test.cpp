@@ -201,5 +201,56 @@ TEST(QueryFarOrigins, BeyondWhatADoubleResolves) {
   }
 }
 
+// The answer of Intersector::exact has no part in the rounding of a moved origin.
+TEST(QueryExact, FromAMovedOrigin) {
+  const std::vector<glm::vec3> corners = {{0.75F, -1.0F, -0x1p-44F}, {0.75F, 1.0F, -0x1p-44F},
+                                          {0.75F, 0.0F, 0x1p-44F},   {0.75F, -1.0F, 0x1p-41F},
+                                          {0.75F, -1.0F, 0.0F},      {0.75F, -0.9F, 0.0F}};
+  const TriangleView triangles{corners};
+  const Tree tree = build(triangles);
+  Ray ray;
+  ray.origin = {0.75F - 0x1p-9F, 0.1F, -16.0F};
+  ray.direction = {0x1p-13F, 0.0F, 1.0F};
+  const auto hit = closest_hit(tree.view(), triangles, ray, Intersector::exact);
+  ASSERT_TRUE(hit.has_value());
+  EXPECT_EQ(hit->triangle, 0u);
+  EXPECT_EQ(hit->t, 16.0F);
+}
+
+// A small triangle whose products single precision loses and a large one that shares its edge must
+// be told apart by the same points.
+TEST(QuerySinglePrecision, SmallAndLargeNeighboursDoNotLeak) {
+  const glm::vec3 p = {-0x1.8b6ceap-42F, -0x1.3fa1a2p-42F, 0.0F};
+  const glm::vec3 q = {0x1.d78fa8p-42F, 0x1.16f4d2p-42F, 0.0F};
+  const std::vector<glm::vec3> corners = {p, q, {-1, 0, 0}, q, p, {3 * 0x1p-41F, 0, 0}};
+  const TriangleView triangles{corners};
+  const Tree tree = build(triangles);
+  test::Random random(7);
+  std::vector<Ray> rays;
+  for (int i = 0; i < 200000; ++i) {
+    Ray ray;
+    ray.origin = random.in_cube() * 0x1p-40F;
+    ray.origin.z = -1.0F;
+    const glm::vec3 target = p + random.unit() * (q - p);
+    ray.direction = {target.x - ray.origin.x, target.y - ray.origin.y, 1.0F};
+    rays.push_back(ray);
+  }
+  std::vector<Hit> hits(rays.size());
+  for (const Intersector intersector : {Intersector::watertight, Intersector::single_precision}) {
+    closest_hit(cpu::Executor{}, tree.view(), triangles, rays, hits, {}, intersector);
+    EXPECT_EQ(
+        std::count_if(hits.begin(), hits.end(), [](const Hit& hit) { return !test::is_hit(hit); }),
+        0)
+        << to_string(intersector);
+  }
+}
+
+TEST(OffsetOrigin, StaysAFloatAtTheEndOfFloats) {
+  constexpr float most = std::numeric_limits<float>::max();
+  const std::vector<glm::vec3> corners = {{most, 0, 0}, {most, 1e38F, 0}, {most, 0, 1e38F}};
+  const glm::vec3 at = offset_origin(TriangleView{corners}, {1.0F, 0.25F, 0.25F, 0}, {1, 0, 0});
+  EXPECT_EQ(at.x, most);
+}
+
 }  // namespace
 }  // namespace zkd

@@ -224,6 +224,18 @@ TEST(VerifyBand, FromFurtherAwayThanADoubleResolves) {
   expect(scene.verdict(ray, on(0, 1), Intersector::single_precision), Verdict::phantom, false);
 }
 
+// Of a scene of the smallest floats products underflow even when it has been scaled.
+TEST(VerifyBand, UnderflowInTheSmallestScenes) {
+  constexpr float least = std::numeric_limits<float>::denorm_min();
+  const Scene scene(triangles({{0, -least, least}, {0, least, least}, {least, 0, least}}));
+  for (int k = 106; k <= 110; ++k) {
+    Ray ray;
+    ray.direction = {-std::ldexp(1.0F, -k), 0, 1};
+    ASSERT_FALSE(scene.oracle.any_hit(ray));
+    expect(scene.verdict(ray, on(0, static_cast<double>(least))), Verdict::phantom, true);
+  }
+}
+
 TEST(VerifyBand, NothingIsHitThatHasNoArea) {
   const Scene scene(triangles({{-1, 0.1F, 1}, {1, 0.1F, 1}, {0.5F, 0.1F, 1}}));
   expect(scene.verdict(oblique({0.2F, 0.1F, 1}), on(0, 1)), Verdict::phantom, false);

@@ -34,13 +34,13 @@ namespace zkd {
 
 /// How a ray is tested against a triangle: a choice of the query, of which the tree knows nothing.
 ///
-/// In what follows, R is the largest distance along an axis from the ray's origin (of an origin far
-/// outside the scene: from the point of the ray next to the scene) to a corner of the triangle, and
-/// k = |d| |n| / |d . n| says how edge-on it is seen (d the direction, n the normal; 1: from the
-/// front). "Within e" means: hit and miss are those of exact arithmetic for a triangle whose
-/// corners are moved by e at most along each axis, one such triangle for all three edges.
-/// |t - exact t| |d| is bounded too, to which rounding t to a float adds half a unit in its last
-/// place.
+/// In what follows, R is the largest distance along an axis from the ray's origin to a corner of
+/// the triangle (for an origin further than 8 C from the scene's box, C being its largest
+/// coordinate: 32 C), and k = |d| |n| / |d . n| says how edge-on it is seen (d the direction, n the
+/// normal; 1: from the front). "Within e" means: hit and miss are those of exact arithmetic for a
+/// triangle whose corners are moved by e at most along each axis, the same corner in the same way
+/// for all its edges. |t - exact t| |d| is bounded too, to which rounding t to a float adds half a
+/// unit in its last place. For scenes whose coordinates are less than 2^100 apart.
 enum class Intersector : std::uint8_t {
   /// Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013. Single precision
   /// rejects, with an error bound; double precision decides what is left and gives t, u and v.
@@ -55,13 +55,11 @@ enum class Intersector : std::uint8_t {
   fast,
 
   /// Woop, Benthin, Wald in single precision, with Kahan's difference of products: for devices on
-  /// which double precision is slow. Watertight. Within 9 * 2^-24 R; t to (13 k + 26) * 2^-24 R,
-  /// short of underflow.
+  /// which double precision is slow. Watertight. Within 9 * 2^-24 R; t to (13 k + 26) * 2^-24 R.
   single_precision,
 
-  /// The answers of `watertight`, bit for bit, by double precision alone: what its filter is
-  /// checked
-  /// against.
+  /// The answers of `watertight`, bit for bit, by double precision alone: what its filter
+  /// is checked against.
   double_precision,
 
   /// No rounding: the triangle that is exactly hit first, of equally near ones the lowest index;
@@ -125,7 +123,8 @@ ZKD_API void closest_hit_brute_force(const cpu::Executor& executor, const TreeVi
 /// ("Spawned rays" in docs/accuracy.md). Near an edge the point may lie behind another triangle
 /// that meets this one there at less than a right angle, as with every offset.
 ///
-/// `hit` is one of `triangles`, not a miss. O(1); allocates nothing.
+/// `hit` is one of `triangles`, not a miss. A coordinate stays at most the largest float: there the
+/// point may lie in the plane. O(1); allocates nothing.
 [[nodiscard]] ZKD_API glm::vec3 offset_origin(
     const TriangleView& triangles, const Hit& hit, const glm::vec3& direction,
     Intersector intersector = Intersector::watertight) noexcept;

@@ -35,9 +35,11 @@ using LongPoint = std::array<Long, 3>;
 // What a t next to zero is rounded by when it is answered as a float.
 constexpr double smallest_float = 0x1p-149;
 
-// What products of two coordinates lose to underflow in single precision, of the square of the
-// largest: a scene is brought to coordinates of 2^-16 to 2^32, and 2^-148 of its units lost.
+// What products of two coordinates lose to underflow in single precision: 2^-148 of units in which
+// the largest coordinate is 2^-16 to 2^32 (2^-110 of its square at most), or which are 2^-127 of
+// the caller's, the smallest that a scene is scaled from.
 constexpr double lost_products = 0x1p-110;
+constexpr double least_lost = 0x1p-402;
 
 // An origin this many times the largest coordinate away is brought near the scene first.
 constexpr double far_origin = 8.0;
@@ -84,7 +86,8 @@ struct Judged {
       : ray(caller),
         bounds(bounds_of(intersector)),
         underflow(bounds.unit > 0x1p-50
-                      ? lost_products * oracle.largest_coordinate() * oracle.largest_coordinate()
+                      ? std::max(least_lost, lost_products * oracle.largest_coordinate() *
+                                                 oracle.largest_coordinate())
                       : 0.0),
         o(point(caller.origin)),
         d(point(caller.direction)),

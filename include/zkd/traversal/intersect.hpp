@@ -54,6 +54,17 @@ struct Sheared {
     return {static_cast<double>(t.value), static_cast<double>((w[1] / sum).value),
             static_cast<double>((w[2] / sum).value)};
   }
+
+  /// Whether the line passes inside, and where.
+  ZKD_HOST_DEVICE bool decide(Rounded<T> inverse_depth, Crossing& crossing) const {
+    Rounded<T> w[3];
+    weights(w);
+    if (opposite(w)) return false;
+    const Rounded<T> sum = w[0] + w[1] + w[2];
+    if (!(magnitude(sum) > Rounded<T>(T(0)))) return false;
+    crossing = at(w, sum, inverse_depth);
+    return true;
+  }
 };
 
 /// Whether the ray's line passes outside the triangle for certain, by single precision ("The
@@ -101,13 +112,7 @@ ZKD_HOST_DEVICE inline bool crosses(const PreparedRay& ray, const Corners& corne
     sheared.x[i] = ray.wide_from_origin(corners.p[i], 0) - ray.wide_shear[0] * sheared.depth[i];
     sheared.y[i] = ray.wide_from_origin(corners.p[i], 1) - ray.wide_shear[1] * sheared.depth[i];
   }
-  Wide w[3];
-  sheared.weights(w);
-  if (opposite(w)) return false;
-  const Wide sum = w[0] + w[1] + w[2];
-  if (!(magnitude(sum) > Wide(0.0))) return false;
-  crossing = sheared.at(w, sum, ray.wide_shear[2]);
-  return true;
+  return sheared.decide(ray.wide_shear[2], crossing);
 }
 
 // An intersector is a type that is made from a prepared ray and the caller's, and called with the

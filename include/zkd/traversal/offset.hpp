@@ -19,8 +19,11 @@ ZKD_HOST_DEVICE inline float next_float(float x, bool up) {
   return float_of((x > 0.0F) == up ? bits + 1 : bits - 1);
 }
 
-/// The nearest float that is not below x (`up`), or not above it.
+/// The nearest float that is not below x (`up`), or not above it; at most the largest.
 ZKD_HOST_DEVICE inline float rounded_toward(Wide x, bool up) {
+  constexpr double float_max = 3.4028234663852886e38;
+  if (!(magnitude(x) < Wide(float_max)))
+    return static_cast<float>(x.value < 0.0 ? -float_max : float_max);
   const auto nearest = static_cast<float>(x.value);
   const auto exactly = static_cast<double>(nearest);
   const bool beyond = up ? exactly >= x.value : exactly <= x.value;

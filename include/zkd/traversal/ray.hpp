@@ -210,7 +210,7 @@ struct PreparedRay {
     const Wide end = Wide(static_cast<double>(t)) * to_tree;
     // The t that is compared with it was rounded to float once, and in the caller's units: by a
     // relative error or, where it is denormal, by an absolute one.
-    const Wide relative = 1.0 / 4194304.0;  // 2^-22
+    const Wide relative = 1.0 / 2097152.0;  // 2^-21
     const Wide absolute = Wide(power_of_two(-149)) * to_tree;
     const Wide reached =
         (end - t_shift) + outward * (relative * magnitude(end) + absolute + Wide(1.0e-30));

@@ -21,7 +21,8 @@ namespace zkd::core {
 inline constexpr float smallest_sum = 8.2718061e-25F;  // 2^-80
 
 /// Intersector::single_precision: Woop, Benthin, Wald 2013, with Kahan's difference of products in
-/// the place of their fallback to double; that is asked only where single precision underflows.
+/// the place of their fallback to double; that decides, for the same points, where single precision
+/// underflows.
 class SinglePrecision {
  public:
   using Candidate = core::Candidate;
@@ -44,12 +45,24 @@ class SinglePrecision {
     Crossing crossing;
     if (magnitude(sum) > Real(smallest_sum))
       crossing = sheared.at(w, sum, ray_.shear[2]);
-    else if (!crosses(ray_, corners, crossing))
+    else if (!decide_in_double(sheared, crossing))
       return false;
     return accept(ray_, crossing, id, best);
   }
 
  private:
+  /// For the same points, which a neighbour has that is large enough: their products are exact in
+  /// double.
+  ZKD_HOST_DEVICE bool decide_in_double(const Sheared<float>& single, Crossing& crossing) const {
+    Sheared<double> sheared;
+    for (int i = 0; i < 3; ++i) {
+      sheared.x[i] = static_cast<double>(single.x[i].value);
+      sheared.y[i] = static_cast<double>(single.y[i].value);
+      sheared.depth[i] = static_cast<double>(single.depth[i].value);
+    }
+    return sheared.decide(ray_.wide_shear[2], crossing);
+  }
+
   const PreparedRay& ray_;
 };
 

@@ -63,7 +63,9 @@ class ExactIntersect {
   ExactIntersect(const PreparedRay& prepared, const Ray& ray) : prepared_(prepared), ray_(ray) {}
 
   bool operator()(const Corners& corners, std::uint32_t id, Candidate& best) const {
-    return !surely_misses(prepared_, corners) && decide(corners, id, best);
+    // The filter is of the ray as it was prepared: from a moved origin that is another one, by a
+    // rounding.
+    return (prepared_.moved || !surely_misses(prepared_, corners)) && decide(corners, id, best);
   }
 
  private:
