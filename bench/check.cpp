@@ -25,6 +25,7 @@ struct CheckedScene {
   unsigned size;        // of the timed image: its rays are taken where they are enough
   std::uint64_t count;  // rays of each kind
   std::uint64_t seed;
+  Intersector intersector;
   int threads;
 };
 
@@ -51,11 +52,13 @@ verify::Summary judge(const CheckedScene& scene, const std::vector<Ray>& rays,
                       const std::vector<Hit>& hits, const std::string& what) {
   scene::Progress progress("checking " + what, rays.size());
   std::uint64_t shown = 0;
-  return verify::check(scene.oracle, scene.mesh.view(), rays, hits, scene.threads,
-                       [&](std::uint64_t done) {
-                         progress.advance(done - shown);
-                         shown = done;
-                       });
+  return verify::check(
+      scene.oracle, scene.mesh.view(), rays, hits, scene.threads,
+      [&](std::uint64_t done) {
+        progress.advance(done - shown);
+        shown = done;
+      },
+      scene.intersector);
 }
 
 Check as_check(const verify::Summary& summary) {
@@ -148,7 +151,8 @@ class OracleChecker final : public Checker {
                 int threads)
       : oracle_(mesh.view(), search_for(options, mesh.faces.size())),
         scene_{mesh,         oracle_,       camera,       options.rays,
-               options.size, options.check, options.seed, threads},
+               options.size, options.check, options.seed, options.intersector,
+               threads},
         closed_(scene::is_closed(mesh)) {}
 
   void check(ZkdContender& contender, Result& result) const override {

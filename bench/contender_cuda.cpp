@@ -85,8 +85,12 @@ class DeviceMesh {
 
 class CudaContender final : public ZkdContender {
  public:
-  CudaContender(std::shared_ptr<const DeviceMesh> mesh, const BuildOptions& options)
-      : mesh_(std::move(mesh)), options_(options), clock_(mesh_->stream()) {}
+  CudaContender(std::shared_ptr<const DeviceMesh> mesh, const BuildOptions& options,
+                Intersector intersector)
+      : mesh_(std::move(mesh)),
+        options_(options),
+        intersector_(intersector),
+        clock_(mesh_->stream()) {}
 
   // Finds the capacity of `all`, builds for the first time, and looks at what was built.
   void describe(Result& result) override {
@@ -141,23 +145,45 @@ class CudaContender final : public ZkdContender {
     Timing timing;
     if (kind == RayKind::shadow) {
       std::vector<std::uint8_t> occluded(rays.size());
-      timing.ms = trace_any(rays, occluded, {});
+      timing.ms = any_hit(rays, occluded, {});
       timing.hits = count_hits(occluded);
     } else {
       std::vector<Hit> hits(rays.size());
-      timing.ms = trace_closest(rays, hits, {});
+      timing.ms = closest_hit(rays, hits, {});
       timing.hits = count_hits(hits);
     }
     return timing;
   }
 
-  void closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
-                   std::span<TraversalCost> costs) override {
-    trace_closest(rays, hits, costs);
+  // Rays to the device, answers back; the milliseconds are those between.
+  double closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
+                     std::span<TraversalCost> costs) override {
+    if (rays.empty()) return 0.0;
+    hits_.reserve(rays.size());
+    const std::span<const Ray> on_device = upload(rays);
+    const std::span<TraversalCost> counted = room_for(costs);
+    const double ms = clock_.time([&] {
+      zkd::closest_hit(executor(), tree_.view(), tree_.triangles(), on_device,
+                       hits_.first(rays.size()), counted, intersector_);
+    });
+    download(hits, hits_.data());
+    download(costs, costs_.data());
+    return ms;
   }
-  void any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
-               std::span<TraversalCost> costs) override {
-    trace_any(rays, occluded, costs);
+
+  double any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                 std::span<TraversalCost> costs) override {
+    if (rays.empty()) return 0.0;
+    occluded_.reserve(rays.size());
+    const std::span<const Ray> on_device = upload(rays);
+    const std::span<TraversalCost> counted = room_for(costs);
+    const double ms = clock_.time([&] {
+      zkd::any_hit(executor(), tree_.view(), tree_.triangles(), on_device,
+                   occluded_.first(rays.size()), counted, intersector_);
+    });
+    download(occluded, occluded_.data());
+    download(costs, costs_.data());
+    return ms;
   }
 
   const Tree& tree() override {
@@ -295,37 +321,6 @@ class CudaContender final : public ZkdContender {
     gpu.d2h_ms = spread_of(std::move(back));
   }
 
-  // Rays to the device, answers back; the milliseconds are those between.
-  double trace_closest(std::span<const Ray> rays, std::span<Hit> hits,
-                       std::span<TraversalCost> costs) {
-    if (rays.empty()) return 0.0;
-    hits_.reserve(rays.size());
-    const std::span<const Ray> on_device = upload(rays);
-    const std::span<TraversalCost> counted = room_for(costs);
-    const double ms = clock_.time([&] {
-      zkd::closest_hit(executor(), tree_.view(), tree_.triangles(), on_device,
-                       hits_.first(rays.size()), counted);
-    });
-    download(hits, hits_.data());
-    download(costs, costs_.data());
-    return ms;
-  }
-
-  double trace_any(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
-                   std::span<TraversalCost> costs) {
-    if (rays.empty()) return 0.0;
-    occluded_.reserve(rays.size());
-    const std::span<const Ray> on_device = upload(rays);
-    const std::span<TraversalCost> counted = room_for(costs);
-    const double ms = clock_.time([&] {
-      zkd::any_hit(executor(), tree_.view(), tree_.triangles(), on_device,
-                   occluded_.first(rays.size()), counted);
-    });
-    download(occluded, occluded_.data());
-    download(costs, costs_.data());
-    return ms;
-  }
-
   std::span<const Ray> upload(std::span<const Ray> rays) {
     rays_.reserve(rays.size());
     check_cuda(cudaMemcpyAsync(rays_.data(), rays.data(), rays.size_bytes(), cudaMemcpyHostToDevice,
@@ -350,6 +345,7 @@ class CudaContender final : public ZkdContender {
 
   std::shared_ptr<const DeviceMesh> mesh_;  // before the tree, which gives back on its stream
   BuildOptions options_;
+  Intersector intersector_;
   CudaClock clock_;
   CudaArray<std::byte> workspace_;
   cuda::Tree tree_;
@@ -364,11 +360,12 @@ class CudaContender final : public ZkdContender {
 }  // namespace
 
 std::vector<std::unique_ptr<ZkdContender>> cuda_contenders(const TriangleView& triangles,
-                                                           std::span<const BuildOptions> settings) {
+                                                           std::span<const BuildOptions> settings,
+                                                           Intersector intersector) {
   const auto mesh = std::make_shared<const DeviceMesh>(triangles);
   std::vector<std::unique_ptr<ZkdContender>> contenders;
   for (const BuildOptions& options : settings) {
-    contenders.push_back(std::make_unique<CudaContender>(mesh, options));
+    contenders.push_back(std::make_unique<CudaContender>(mesh, options, intersector));
   }
   return contenders;
 }

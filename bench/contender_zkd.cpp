@@ -15,8 +15,8 @@ namespace {
 class CpuContender final : public ZkdContender {
  public:
   CpuContender(const cpu::Executor& executor, const TriangleView& triangles,
-               const BuildOptions& options)
-      : executor_(executor), triangles_(triangles), options_(options) {}
+               const BuildOptions& options, Intersector intersector)
+      : executor_(executor), triangles_(triangles), options_(options), intersector_(intersector) {}
 
   double build() override {
     clear();
@@ -29,16 +29,12 @@ class CpuContender final : public ZkdContender {
     Timing timing;
     if (kind == RayKind::shadow) {
       occluded_.resize(rays.size());
-      const Stopwatch watch;
-      zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded_);
-      timing.ms = watch.ms();
+      timing.ms = any_hit(rays, occluded_, {});
       timing.hits = count_hits(occluded_);
       return timing;
     }
     hits_.resize(rays.size());
-    const Stopwatch watch;
-    zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits_);
-    timing.ms = watch.ms();
+    timing.ms = closest_hit(rays, hits_, {});
     timing.hits = count_hits(hits_);
     return timing;
   }
@@ -70,13 +66,17 @@ class CpuContender final : public ZkdContender {
 
   void measure_more(Result&, unsigned) override {}
 
-  void closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
-                   std::span<TraversalCost> costs) override {
-    zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits, costs);
+  double closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
+                     std::span<TraversalCost> costs) override {
+    const Stopwatch watch;
+    zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits, costs, intersector_);
+    return watch.ms();
   }
-  void any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
-               std::span<TraversalCost> costs) override {
-    zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded, costs);
+  double any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                 std::span<TraversalCost> costs) override {
+    const Stopwatch watch;
+    zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded, costs, intersector_);
+    return watch.ms();
   }
 
   const Tree& tree() override { return tree_; }
@@ -85,6 +85,7 @@ class CpuContender final : public ZkdContender {
   cpu::Executor executor_;
   TriangleView triangles_;
   BuildOptions options_;
+  Intersector intersector_;
   Tree tree_;
   std::vector<Hit> hits_;
   std::vector<std::uint8_t> occluded_;
@@ -94,8 +95,8 @@ class CpuContender final : public ZkdContender {
 
 std::unique_ptr<ZkdContender> cpu_contender(const cpu::Executor& executor,
                                             const TriangleView& triangles,
-                                            const BuildOptions& options) {
-  return std::make_unique<CpuContender>(executor, triangles, options);
+                                            const BuildOptions& options, Intersector intersector) {
+  return std::make_unique<CpuContender>(executor, triangles, options, intersector);
 }
 
 }  // namespace zkd::bench

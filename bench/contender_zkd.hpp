@@ -32,10 +32,11 @@ class ZkdContender : public Contender {
   virtual void measure_more(Result& result, unsigned repeat) = 0;
 
   /// Answers of the tree that build() built last, as zkd/query.hpp has them; spans in host memory.
-  virtual void closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
-                           std::span<TraversalCost> costs = {}) = 0;
-  virtual void any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
-                       std::span<TraversalCost> costs = {}) = 0;
+  /// Returns milliseconds, without those of copies to and from a device.
+  virtual double closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
+                             std::span<TraversalCost> costs = {}) = 0;
+  virtual double any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
+                         std::span<TraversalCost> costs = {}) = 0;
 
   /// The tree that build() built last, in host memory. Valid until build() or clear().
   [[nodiscard]] virtual const Tree& tree() = 0;
@@ -44,6 +45,7 @@ class ZkdContender : public Contender {
 /// zkd on the CPU. `triangles` must outlive it.
 [[nodiscard]] std::unique_ptr<ZkdContender> cpu_contender(const cpu::Executor& executor,
                                                           const TriangleView& triangles,
-                                                          const BuildOptions& options);
+                                                          const BuildOptions& options,
+                                                          Intersector intersector);
 
 }  // namespace zkd::bench

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What zkd-bench asks of CUDA. No header of CUDA is needed to include this one; cuda_none.cpp
-// stands in where zkd::cuda is not built.
+// What the programs here ask of CUDA. No header of CUDA is needed to include this one;
+// cuda_none.cpp stands in where zkd::cuda is not built.
 #pragma once
 
 #include <memory>
@@ -17,6 +17,15 @@ namespace zkd::bench {
 /// Why nothing can be built on a CUDA device here, in words; empty if it can.
 [[nodiscard]] std::string why_no_cuda();
 
+/// What --backend comes to here, and why not CUDA if that was asked for.
+struct Where {
+  Backend backend = Backend::cpu;  ///< cpu or cuda
+  std::string why_not_cuda;
+};
+
+/// Throws Error backend_unavailable for `cuda` where it cannot be had.
+[[nodiscard]] Where resolve(Backend wanted);
+
 /// Adds the current device and its driver, as far as they can be found out.
 void describe_device(Machine& machine);
 
@@ -27,7 +36,7 @@ void describe_device(Machine& machine);
 /// Everything of them throws Error backend_unavailable, device_failure or out_of_memory where CUDA
 /// refuses.
 [[nodiscard]] std::vector<std::unique_ptr<ZkdContender>> cuda_contenders(
-    const TriangleView& triangles, std::span<const BuildOptions> settings);
+    const TriangleView& triangles, std::span<const BuildOptions> settings, Intersector intersector);
 
 /// What the first build of a process takes.
 struct ColdBuild {

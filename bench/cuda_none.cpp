@@ -7,12 +7,13 @@
 
 namespace zkd::bench {
 
-std::string why_no_cuda() { return "this zkd-bench was built without CUDA"; }
+std::string why_no_cuda() { return "this program was built without CUDA"; }
 
 void describe_device(Machine&) {}
 
 std::vector<std::unique_ptr<ZkdContender>> cuda_contenders(const TriangleView&,
-                                                           std::span<const BuildOptions>) {
+                                                           std::span<const BuildOptions>,
+                                                           Intersector) {
   throw Error(ErrorCode::backend_unavailable, 0, why_no_cuda());
 }
 

@@ -87,6 +87,7 @@ Json json_of_options(const Result& result) {
           {"invalid", zkd::to_string(options.invalid_triangles)},
           {"reference_capacity", options.reference_capacity},
           {"instructions", result.instructions},
+          {"intersector", result.intersector},
           {"seed", result.seed}};
 }
 

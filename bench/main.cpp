@@ -28,24 +28,6 @@
 namespace zkd::bench {
 namespace {
 
-// Where zkd builds, and why not on CUDA if that was asked for.
-struct Where {
-  Backend backend = Backend::cpu;
-  std::string why_not_cuda;
-};
-
-Where resolve(Backend wanted) {
-  if (wanted == Backend::cpu) return {};
-  Where where;
-  where.why_not_cuda = why_no_cuda();
-  if (where.why_not_cuda.empty()) {
-    where.backend = Backend::cuda;
-  } else if (wanted == Backend::cuda) {
-    throw Error(ErrorCode::backend_unavailable, 0, "--backend cuda: " + where.why_not_cuda);
-  }
-  return where;
-}
-
 std::vector<scene::SceneInfo> find_scenes(const Options& options) {
   if (options.scenes.empty()) {
     std::vector<scene::SceneInfo> scenes = scene::paper_scenes();

@@ -9,19 +9,16 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <initializer_list>
-#include <span>
-#include <string_view>
 
 #include <zkd/config.hpp>
 #include <zkd/geometry.hpp>
 
+#include "choices.hpp"
 #include "command_line.hpp"
 
 namespace zkd::bench {
 namespace {
 
-constexpr std::array all_backends{Backend::automatic, Backend::cpu, Backend::cuda};
 constexpr std::array all_references{References::once, References::budget, References::all,
                                     References::automatic};
 constexpr std::array all_builders{Builder::morton, Builder::sah, Builder::wu2011};
@@ -32,44 +29,6 @@ constexpr std::array all_ray_kinds{RayKind::primary, RayKind::diffuse, RayKind::
 constexpr std::array all_instructions{cpu::InstructionSet::automatic, cpu::InstructionSet::portable,
                                       cpu::InstructionSet::avx2};
 constexpr std::array all_peers{PeerLibrary::embree};
-
-template <class Enum, std::size_t N>
-std::string names_of(const std::array<Enum, N>& values, const char* separator) {
-  using bench::to_string;
-  using zkd::to_string;
-  std::string names;
-  for (const Enum value : values) {
-    if (!names.empty()) names += separator;
-    names += to_string(value);
-  }
-  return names;
-}
-
-template <class Enum, std::size_t N>
-Enum value_named(const std::array<Enum, N>& values, const std::string& option,
-                 std::string_view name) {
-  using bench::to_string;
-  using zkd::to_string;
-  for (const Enum value : values) {
-    if (name == to_string(value)) return value;
-  }
-  throw UsageError(option + ": '" + std::string(name) + "' is not one of " +
-                   names_of(values, ", "));
-}
-
-// A comma-separated list without repetitions.
-template <class Enum, std::size_t N>
-std::vector<Enum> values_listed(const std::array<Enum, N>& values, const std::string& option,
-                                std::string_view list) {
-  std::vector<Enum> found;
-  for (;;) {
-    const std::size_t comma = list.find(',');
-    const Enum value = value_named(values, option, list.substr(0, comma));
-    if (std::find(found.begin(), found.end(), value) == found.end()) found.push_back(value);
-    if (comma == std::string_view::npos) return found;
-    list.remove_prefix(comma + 1);
-  }
-}
 
 const char* on_off(bool value) { return value ? "on" : "off"; }
 
@@ -96,18 +55,6 @@ std::string label_of(const BuildOptions& setting, bool builders, bool qualities,
 }  // namespace
 
 const char* to_string(PeerLibrary) noexcept { return "embree"; }
-
-const char* to_string(cpu::InstructionSet value) noexcept {
-  switch (value) {
-    case cpu::InstructionSet::automatic:
-      return "auto";
-    case cpu::InstructionSet::portable:
-      return "portable";
-    case cpu::InstructionSet::avx2:
-      return "avx2";
-  }
-  return "auto";
-}
 
 std::vector<std::string> flags_of(const BuildOptions& options) {
   return {"--builder",
@@ -144,7 +91,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   std::string invalid = zkd::to_string(defaults.invalid_triangles);
   std::string recode = on_off(defaults.recode_crowded);
   std::string measure_quality = "on";
-  std::string instructions = bench::to_string(options.instructions);
+  std::string instructions = to_string(options.instructions);
+  std::string intersector = zkd::to_string(options.intersector);
   std::string rays = names_of(all_ray_kinds, ",");
   std::string peers;
   double budget = static_cast<double>(defaults.budget);
@@ -205,6 +153,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   text(build, "--instructions", instructions, names_of(all_instructions, ", "), "SET");
 
   const char* measure = "Measure";
+  text(measure, "--intersector", intersector, "How: " + names_of(all_intersectors, ", "), "HOW");
   text(measure, "--rays", rays, "List of " + names_of(all_ray_kinds, ", "), "LIST");
   number(measure, "--size", size, "N x N primary rays", 1, 16384);
   number(measure, "--seed", seed, "Of bounces and light samples", 0,
@@ -229,17 +178,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   app.add_option("--images", images, "Write PNG: shaded, depth, node visits")
       ->group(report)
       ->type_name("DIR");
-  app.footer(
-      "Exit status: 0 done; 1 a check failed; 2 bad input or usage; 3 device or memory failure.");
-
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& done) {
-    app.exit(done);
-    return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw UsageError(one_line(error.what()));
-  }
+  app.footer(exit_status_help);
+  if (!parse(app, argc, argv)) return std::nullopt;
 
   if (options.cold && options.scenes.size() != 1) {
     throw UsageError("--cold: needs one SCENE");
@@ -278,6 +218,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   options.threads = static_cast<int>(threads);
   options.instructions = value_named(all_instructions, "--instructions", instructions);
   options.measure_quality = on_or_off("--measure-quality", measure_quality);
+  options.intersector = value_named(all_intersectors, "--intersector", intersector);
   options.rays = values_listed(all_ray_kinds, "--rays", rays);
   std::sort(options.rays.begin(), options.rays.end());
   options.size = static_cast<unsigned>(size);

@@ -11,6 +11,7 @@
 
 #include <zkd/cpu/executor.hpp>
 #include <zkd/options.hpp>
+#include <zkd/query.hpp>
 
 #include "results.hpp"
 #include "usage_error.hpp"
@@ -33,6 +34,7 @@ struct Options {
   cpu::InstructionSet instructions = cpu::InstructionSet::automatic;
   bool measure_quality = true;
 
+  Intersector intersector = Intersector::watertight;
   std::vector<RayKind> rays;
   unsigned size = 1024;
   std::uint64_t seed = 1;
@@ -47,9 +49,6 @@ struct Options {
   std::optional<std::filesystem::path> images;
   bool list = false;
 };
-
-/// "auto", "portable" or "avx2". Static storage.
-[[nodiscard]] const char* to_string(cpu::InstructionSet value) noexcept;
 
 /// The flags that give these build options on a command line (--backend aside).
 [[nodiscard]] std::vector<std::string> flags_of(const BuildOptions& options);

@@ -116,6 +116,7 @@ struct Result {
   int threads = 0;
   BuildOptions options;  ///< as used, after automatic
   std::string instructions;
+  std::string intersector;
   std::uint64_t seed = 0;
   Spread build_ms;
   std::vector<Spread> stages_ms;  ///< one for each Stage, in order

@@ -148,7 +148,8 @@ void measure_traversal(Result& result, const Workload& workload, ZkdContender& c
 
 // Whether the contender's answers have the bits of the CPU's.
 bool answers_equal(const Workload& workload, const TriangleView& triangles, const Tree& tree,
-                   const cpu::Executor& executor, ZkdContender& contender) {
+                   const cpu::Executor& executor, Intersector intersector,
+                   ZkdContender& contender) {
   const auto same = [](const auto& a, const auto& b) {
     return std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
   };
@@ -156,13 +157,13 @@ bool answers_equal(const Workload& workload, const TriangleView& triangles, cons
     if (kind == RayKind::shadow) {
       std::vector<std::uint8_t> expected(rays.size());
       std::vector<std::uint8_t> seen(rays.size());
-      any_hit(executor, tree.view(), triangles, rays, expected);
+      any_hit(executor, tree.view(), triangles, rays, expected, {}, intersector);
       contender.any_hit(rays, seen);
       if (!rays.empty() && !same(expected, seen)) return false;
     } else {
       std::vector<Hit> expected(rays.size());
       std::vector<Hit> seen(rays.size());
-      closest_hit(executor, tree.view(), triangles, rays, expected);
+      closest_hit(executor, tree.view(), triangles, rays, expected, {}, intersector);
       contender.closest_hit(rays, seen);
       if (!rays.empty() && !same(expected, seen)) return false;
     }
@@ -184,6 +185,7 @@ Result describe(const scene::SceneInfo& info, const scene::Mesh& mesh, const Opt
   result.paper_ms = info.paper_ms;
   result.threads = executor.threads;
   result.instructions = to_string(executor.instructions);
+  result.intersector = to_string(options.intersector);
   result.seed = options.seed;
 
   BuildOptions build = options.settings[setting];
@@ -198,10 +200,11 @@ Result describe(const scene::SceneInfo& info, const scene::Mesh& mesh, const Opt
 std::vector<std::unique_ptr<ZkdContender>> our_contenders(const Options& options, Backend backend,
                                                           const TriangleView& triangles,
                                                           const cpu::Executor& executor) {
-  if (backend == Backend::cuda) return cuda_contenders(triangles, options.settings);
+  if (backend == Backend::cuda)
+    return cuda_contenders(triangles, options.settings, options.intersector);
   std::vector<std::unique_ptr<ZkdContender>> contenders;
   for (const BuildOptions& setting : options.settings) {
-    contenders.push_back(cpu_contender(executor, triangles, setting));
+    contenders.push_back(cpu_contender(executor, triangles, setting, options.intersector));
   }
   return contenders;
 }
@@ -239,7 +242,8 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
     contender.build();
     measure_traversal(result, workload, contender);
     if (result.gpu) {
-      result.gpu->hits_equal = answers_equal(workload, triangles, tree, executor, contender);
+      result.gpu->hits_equal =
+          answers_equal(workload, triangles, tree, executor, options.intersector, contender);
       if (const auto cold = cold_build_elsewhere(info.path, result.options)) {
         result.gpu->context_ms = cold->context_ms;
         result.gpu->cold_ms = cold->build_ms;

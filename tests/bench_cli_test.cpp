@@ -47,11 +47,12 @@ TEST_F(BenchCli, HelpVersionAndListSucceed) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.status, 0);
   for (const char* option :
-       {"--backend", "--threads",      "--references", "--budget",     "--builder",
-        "--quality", "--leaf-size",    "--code-bits",  "--axis-order", "--recode",
-        "--invalid", "--instructions", "--rays",       "--size",       "--repeat",
-        "--peers",   "--check",        "--json",       "--images",     "--list",
-        "--version", "--seed",         "--cold",       "--time-limit", "--reference-capacity"}) {
+       {"--backend",    "--threads",      "--references", "--budget",     "--builder",
+        "--quality",    "--leaf-size",    "--code-bits",  "--axis-order", "--recode",
+        "--invalid",    "--instructions", "--rays",       "--size",       "--repeat",
+        "--peers",      "--check",        "--json",       "--images",     "--list",
+        "--version",    "--seed",         "--cold",       "--time-limit", "--reference-capacity",
+        "--intersector"}) {
     EXPECT_NE(help.out.find(option), std::string::npos) << option;
   }
   const Outcome version = run("--version");
@@ -77,6 +78,7 @@ TEST_F(BenchCli, BadUsageIsOneLineThatNamesTheOption) {
   expect_error("tetra.obj --recode maybe", 2, "--recode");
   expect_error("tetra.obj --invalid keep", 2, "--invalid");
   expect_error("tetra.obj --instructions mmx", 2, "--instructions");
+  expect_error("tetra.obj --intersector woop", 2, "--intersector");
   expect_error("tetra.obj --budget 0.5", 2, "--budget");
   expect_error("tetra.obj --budget nan", 2, "--budget");
   for (const char* option : {"--threads", "--leaf-size", "--code-bits", "--size", "--repeat",
@@ -213,9 +215,9 @@ TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
     EXPECT_EQ(result["backend"], "cpu");
     EXPECT_FALSE(result.contains("gpu"));
     EXPECT_EQ(result["threads"], 2);
-    expect_keys(result["options"],
-                {"builder", "quality", "references", "budget", "leaf_size", "code_bits",
-                 "axis_order", "recode", "invalid", "reference_capacity", "instructions", "seed"});
+    expect_keys(result["options"], {"builder", "quality", "references", "budget", "leaf_size",
+                                    "code_bits", "axis_order", "recode", "invalid",
+                                    "reference_capacity", "instructions", "intersector", "seed"});
     expect_spread(result["build_ms"], 2);
     expect_keys(result["stages_ms"], {"validate", "encode", "sort", "references", "tight_boxes"});
     expect_keys(result["allocated_bytes"], {"tree", "workspace", "asked_beforehand"});
@@ -271,7 +273,7 @@ TEST_F(BenchCli, OpenMeshHasNoLeaksToCount) {
 TEST_F(BenchCli, EveryBuildOptionIsPassedOnAndRecorded) {
   const Json json = run_json(
       "tetra.obj --leaf-size 2 --code-bits 24 --axis-order cyclic"
-      " --recode off --invalid skip --instructions portable --budget 1.5" +
+      " --recode off --invalid skip --instructions portable --budget 1.5 --intersector single" +
       std::string(quick));
   const Json& options = json["results"][0]["options"];
   EXPECT_EQ(options["leaf_size"], 2);
@@ -280,7 +282,22 @@ TEST_F(BenchCli, EveryBuildOptionIsPassedOnAndRecorded) {
   EXPECT_EQ(options["invalid"], "skip");
   EXPECT_EQ(options["instructions"], "portable");
   EXPECT_EQ(options["budget"], 1.5);
+  EXPECT_EQ(options["intersector"], "single");
   EXPECT_LE(options["code_bits"], 24);
+}
+
+TEST_F(BenchCli, AnswersAreJudgedByTheBandOfTheirIntersector) {
+  if (!can_check()) GTEST_SKIP() << "built without GMP";
+  for (const char* name : {"watertight", "fast", "single", "double", "exact"}) {
+    const Json json = run_json("tetra.obj --check 500 --intersector " + std::string(name) + quick);
+    const Json& check = json["results"][0]["check"];
+    EXPECT_EQ(check["missed"], 0) << name;
+    EXPECT_EQ(check["phantom"], 0) << name;
+    EXPECT_EQ(check["wrong_triangle"], 0) << name;
+    if (std::string(name) == "exact") {
+      EXPECT_EQ(check["in_band"]["wrong_triangle"], 0);
+    }
+  }
 }
 
 TEST_F(BenchCli, SameTreeAndSameRaysOnAnyNumberOfThreads) {

@@ -131,6 +131,15 @@ TEST(VerifyExact, ZeroArea) {
   EXPECT_FALSE(exact_zero_area({{{0x1p-149, 0, 0}, {0, 0x1p-149, 0}, {0, 0, 0x1p-149}}}));
 }
 
+TEST(VerifyExact, NormalsOfSliversCancel) {
+  EXPECT_EQ(normal_condition({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}), 1.0);
+  // The normal is (0, 0, 1) * 2^-30, from products of 1 and 1 + 2^-30.
+  const double tiny = 0x1p-30;
+  EXPECT_EQ(normal_condition({{{0, 0, 0}, {1, 1, 0}, {2, 2 + tiny, 0}}}), 0x1p31 + 1.0);
+  EXPECT_EQ(normal_condition({{{0, 0, 0}, {1, 1, 1}, {2, 2, 2}}}),
+            std::numeric_limits<double>::infinity());
+}
+
 TEST(VerifyExact, ValidTriangles) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<glm::vec3> positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {nan, 0, 0}};

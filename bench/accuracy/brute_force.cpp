@@ -10,9 +10,10 @@
 #include <zkd/build.hpp>
 #include <zkd/query.hpp>
 
+#include "choices.hpp"
+#include "cuda.hpp"
 #include "scene/progress.hpp"
 #include "scene/random.hpp"
-#include "settings.hpp"
 #include "support/meshes.hpp"
 #include "support/rays.hpp"
 
@@ -50,19 +51,38 @@ BuildOptions options_of(std::uint64_t number, scene::Random& random) {
 }
 
 std::string describe(const std::string& mesh, std::uint64_t case_number,
-                     const BuildOptions& options, std::size_t ray) {
+                     const BuildOptions& options) {
   return mesh + ", case " + std::to_string(case_number) + ", references " +
          zkd::to_string(options.references) + ", leaf size " + std::to_string(options.leaf_size) +
-         ", code bits " + std::to_string(options.code_bits) + ", ray " + std::to_string(ray);
+         ", code bits " + std::to_string(options.code_bits);
 }
 
 struct CaseResult {
   std::size_t intersector;  // which of all_intersectors
   TreeAgainstLoop counts;
+  TreeAgainstLoop cuda_counts;
   std::string first_difference;
 };
 
-CaseResult compare_case(std::uint64_t number, std::uint64_t seed) {
+// Answers to the rays of a case, held against the loop's.
+TreeAgainstLoop compare(const std::vector<Hit>& by_tree, const std::vector<std::uint8_t>& occluded,
+                        const std::vector<Hit>& by_loop, const std::string& what,
+                        std::string& first_difference) {
+  TreeAgainstLoop counts;
+  counts.rays = by_loop.size();
+  for (std::size_t i = 0; i < by_loop.size(); ++i) {
+    const bool different = !same_bits(by_tree[i], by_loop[i]);
+    const bool any_different = (occluded[i] != 0) != (by_loop[i].triangle != no_triangle);
+    if ((different || any_different) && first_difference.empty()) {
+      first_difference = what + ", ray " + std::to_string(i);
+    }
+    counts.different += different ? 1 : 0;
+    counts.any_hit_different += any_different ? 1 : 0;
+  }
+  return counts;
+}
+
+CaseResult compare_case(std::uint64_t number, std::uint64_t seed, bool cuda) {
   const auto kind = static_cast<int>(number / 2 % test::small_mesh_kinds);
   const std::uint64_t variation = number / (2 * test::small_mesh_kinds);
   scene::Random random(seed ^ (number * 0x9E3779B97F4A7C15u));
@@ -83,22 +103,32 @@ CaseResult compare_case(std::uint64_t number, std::uint64_t seed) {
   zkd::closest_hit_brute_force(executor, tree.view(), triangles, rays, by_loop, intersector);
   zkd::any_hit(executor, tree.view(), triangles, rays, occluded, {}, intersector);
 
-  CaseResult result{intersector_of(number), {}, {}};
-  result.counts.rays = rays.size();
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const bool different = !same_bits(by_tree[i], by_loop[i]);
-    const bool any_different = (occluded[i] != 0) != (by_tree[i].triangle != no_triangle);
-    if ((different || any_different) && result.first_difference.empty()) {
-      result.first_difference = std::string(zkd::to_string(intersector)) + " on " +
-                                describe(named.name, number, options, i);
-    }
-    result.counts.different += different ? 1 : 0;
-    result.counts.any_hit_different += any_different ? 1 : 0;
+  CaseResult result{intersector_of(number), {}, {}, {}};
+  const std::string what =
+      std::string(zkd::to_string(intersector)) + " on " + describe(named.name, number, options);
+  result.counts = compare(by_tree, occluded, by_loop, what, result.first_difference);
+  if (cuda && intersector != Intersector::exact && !tree.view().empty()) {
+    // The loop is the host's: the device has to come to its bits.
+    const auto contender =
+        std::move(cuda_contenders(triangles, std::span(&options, 1), intersector).front());
+    Result unused;
+    contender->describe(unused);
+    contender->closest_hit(rays, by_tree);
+    contender->any_hit(rays, occluded);
+    result.cuda_counts =
+        compare(by_tree, occluded, by_loop, "cuda " + what, result.first_difference);
   }
   return result;
 }
 
 }  // namespace
+
+TreeAgainstLoop& TreeAgainstLoop::operator+=(const TreeAgainstLoop& other) {
+  rays += other.rays;
+  different += other.different;
+  any_hit_different += other.any_hit_different;
+  return *this;
+}
 
 std::uint64_t TreeAgainstLoops::rays() const {
   std::uint64_t sum = 0;
@@ -112,23 +142,26 @@ std::uint64_t TreeAgainstLoops::different() const {
   return sum;
 }
 
-TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed, int threads) {
+TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed, int threads,
+                                          bool cuda) {
   TreeAgainstLoops all;
-  for (const Intersector intersector : all_intersectors) {
-    all.of_intersector.push_back({zkd::to_string(intersector)});
+  for (const std::string prefix : {"", "cuda "}) {
+    if (!prefix.empty() && !cuda) break;
+    for (const Intersector intersector : all_intersectors) {
+      all.of_intersector.push_back({prefix + zkd::to_string(intersector)});
+    }
   }
   all.cases = (rays + rays_a_case - 1) / rays_a_case;
   scene::Progress progress("tree against brute force", all.cases);
   std::uint64_t first_case = all.cases;
 #pragma omp parallel for num_threads(threads) schedule(dynamic)
   for (std::uint64_t number = 0; number < all.cases; ++number) {
-    const CaseResult result = compare_case(number, seed);
+    const CaseResult result = compare_case(number, seed, cuda);
 #pragma omp critical(zkd_accuracy_brute_force)
     {
-      TreeAgainstLoop& sum = all.of_intersector[result.intersector];
-      sum.rays += result.counts.rays;
-      sum.different += result.counts.different;
-      sum.any_hit_different += result.counts.any_hit_different;
+      all.of_intersector[result.intersector] += result.counts;
+      if (cuda)
+        all.of_intersector[all_intersectors.size() + result.intersector] += result.cuda_counts;
       if (!result.first_difference.empty() && number < first_case) {
         first_case = number;
         all.first_difference = result.first_difference;

@@ -11,10 +11,12 @@
 namespace zkd::bench::accuracy {
 
 struct TreeAgainstLoop {
-  std::string intersector;
+  std::string name;  ///< the intersector, or "cuda ..."
   std::uint64_t rays = 0;
   std::uint64_t different = 0;          ///< closest_hit: any bit of the answer
-  std::uint64_t any_hit_different = 0;  ///< any_hit is not (closest_hit found something)
+  std::uint64_t any_hit_different = 0;  ///< any_hit is not (the loop found something)
+
+  TreeAgainstLoop& operator+=(const TreeAgainstLoop& other);
 };
 
 struct TreeAgainstLoops {
@@ -28,7 +30,8 @@ struct TreeAgainstLoops {
 
 /// About `rays` rays, spread over the small meshes of the tests (some 300 triangles each, one of
 /// every kind that was ever hard), `once` and `all`, leaf sizes, code widths and axis orders.
+/// With `cuda`, trees and answers of the device as well, held against the loop on the host.
 [[nodiscard]] TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed,
-                                                        int threads);
+                                                        int threads, bool cuda);
 
 }  // namespace zkd::bench::accuracy

@@ -20,6 +20,8 @@ struct Entrant {
   std::string name;
   std::string family;
   bool peer = false;
+  bool cuda = false;
+  bool by_intersector = false;
   std::optional<Intersector> judged_as;  // by whose band; nothing for other walks and peers
   std::unique_ptr<Runner> runner;
   double references_per_triangle = 0.0;
@@ -45,10 +47,8 @@ std::size_t stride_for(Runner& runner, const RaySet& set, double longest_ms) {
   const std::vector<Ray> sample =
       every(set.rays, std::max<std::size_t>(1, set.rays.size() / sample_size));
   std::vector<Hit> hits(sample.size());
-  const Stopwatch watch;
-  runner.closest_hit(sample, hits);
-  const double expected =
-      watch.ms() * static_cast<double>(set.rays.size()) / static_cast<double>(sample.size());
+  const double expected = runner.closest_hit(sample, hits) * static_cast<double>(set.rays.size()) /
+                          static_cast<double>(sample.size());
   return static_cast<std::size_t>(std::max(1.0, std::ceil(expected / longest_ms)));
 }
 
@@ -60,15 +60,17 @@ class Measurement {
 
   std::vector<Point> run() {
     std::vector<Entrant> entrants;
-    for (const Setting& setting : all_settings()) {
+    for (const Setting& setting : all_settings(options_.beside.cuda)) {
       Entrant entrant;
       entrant.name = setting.name;
       entrant.family = setting.family;
+      entrant.cuda = setting.cuda;
+      entrant.by_intersector = is_intersector_setting(setting);
       if (setting.walk == Walk::library) entrant.judged_as = setting.intersector;
       entrant.runner = make_runner(setting, scene_.mesh, executor_);
       entrants.push_back(std::move(entrant));
     }
-    if (options_.peers) {
+    if (options_.beside.peers) {
       for (Peer& peer : make_peers(scene_.mesh, executor_.threads)) {
         Entrant entrant;
         entrant.name = peer.name;
@@ -113,9 +115,7 @@ class Measurement {
       const std::span<const Ray> rays =
           of_set.stride > 1 ? std::span<const Ray>(of_set.rays) : std::span<const Ray>(set.rays);
       hits_.resize(rays.size());
-      const Stopwatch watch;
-      entrant.runner->closest_hit(rays, hits_);
-      of_set.trace_ms.push_back(watch.ms());
+      of_set.trace_ms.push_back(entrant.runner->closest_hit(rays, hits_));
       if (first) {
         of_set.score =
             score({*set.truth, scene_.mesh.view(), entrant.judged_as ? &oracle_ : nullptr,
@@ -133,6 +133,8 @@ class Measurement {
     point.family = entrant.family;
     point.rays = group;
     point.peer = entrant.peer;
+    point.cuda = entrant.cuda;
+    point.by_intersector = entrant.by_intersector;
     point.stand_in = scene_.stand_in;
     point.triangles = scene_.mesh.faces.size();
     point.references_per_triangle = entrant.references_per_triangle;
@@ -172,7 +174,7 @@ void mark_pareto(std::vector<Point>& points) {
   for (const Point& point : points) rays = std::max(rays, point.score.total().rays);
   for (Point& point : points) {
     point.pareto = std::none_of(points.begin(), points.end(), [&](const Point& other) {
-      if (other.rays != point.rays) return false;
+      if (other.rays != point.rays || other.cuda != point.cuda) return false;
       const double cost = cost_of(point, rays);
       const double other_cost = cost_of(other, rays);
       return other_cost <= cost && other.error() <= point.error() &&

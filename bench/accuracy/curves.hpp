@@ -10,6 +10,7 @@
 #include <zkd/cpu/executor.hpp>
 
 #include "results.hpp"
+#include "runner.hpp"
 #include "scenes.hpp"
 #include "score.hpp"
 #include "settings.hpp"
@@ -23,6 +24,8 @@ struct Point {
   std::string family;
   std::string rays;  ///< "workload" or "adversarial"
   bool peer = false;
+  bool cuda = false;
+  bool by_intersector = false;  ///< the defaults, with some intersector
   bool stand_in = false;
   std::uint64_t triangles = 0;
   double references_per_triangle = 0.0;  ///< 0: unknown (a peer)
@@ -30,8 +33,8 @@ struct Point {
   Spread trace_ms;
   double ns_per_ray = 0.0;  ///< at the median, on all threads
   Score score;
-  bool pareto = false;  ///< of all on this scene and these rays, none is faster (build and trace)
-                        ///< without being worse, or better without being slower
+  bool pareto = false;  ///< of all on this scene, these rays and this device, none is faster (build
+                        ///< and trace) without being worse, or better without being slower
 
   [[nodiscard]] double build_and_trace_ms() const { return build_ms.median + trace_ms.median; }
   /// E1 + E2.
@@ -43,7 +46,7 @@ struct CurveOptions {
   /// A setting whose rays would take longer than this on one repetition is measured on every k-th
   /// ray only.
   double longest_ms = 10000.0;
-  bool peers = true;
+  Beside beside;
 };
 
 /// Builds and traces every setting `repeat` times, interleaved, and holds the answers of the first

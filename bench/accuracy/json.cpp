@@ -162,7 +162,7 @@ void add_errors(Json& json, const Report& report) {
 Json json_of(const TreeAgainstLoops& e3) {
   Json rows = Json::array();
   for (const TreeAgainstLoop& one : e3.of_intersector) {
-    rows.push_back({{"name", one.intersector},
+    rows.push_back({{"name", one.name},
                     {"rays", one.rays},
                     {"different", rate(one.different, one.rays)},
                     {"any_hit_different", rate(one.any_hit_different, one.rays)}});
@@ -228,6 +228,7 @@ Json json_of(const Point& point) {
       {"scene", point.scene},
       {"setting", point.setting},
       {"family", point.family},
+      {"backend", point.peer ? Json(nullptr) : Json(point.cuda ? "cuda" : "cpu")},
       {"rays_kind", point.rays},
       {"stand_in", point.stand_in},
       {"triangles", point.triangles},
@@ -260,6 +261,9 @@ std::string to_json(const Report& report, const Options& options) {
                {"commit", or_null(report.machine.commit)},
                {"machine",
                 {{"cpu", or_null(report.machine.cpu)},
+                 {"gpu", or_null(report.machine.gpu)},
+                 {"driver", or_null(report.machine.driver)},
+                 {"cuda", or_null(report.machine.cuda)},
                  {"threads", report.machine.threads},
                  {"compiler", or_null(report.machine.compiler)}}},
                {"seed", options.seed},

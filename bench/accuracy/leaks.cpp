@@ -155,11 +155,11 @@ void count(Runner& runner, const std::string& mesh, const verify::Oracle& oracle
   }
 }
 
-LeaksOf& entry(Leaks& leaks, const std::string& name, bool peer) {
+LeaksOf& entry(Leaks& leaks, const std::string& name, bool peer, bool watertight) {
   const auto found = std::find_if(leaks.of.begin(), leaks.of.end(),
                                   [&](const LeaksOf& one) { return one.name == name; });
   if (found != leaks.of.end()) return *found;
-  leaks.of.push_back({name, peer, {}, {}});
+  leaks.of.push_back({name, peer, watertight, {}, {}});
   return leaks.of.back();
 }
 
@@ -176,7 +176,7 @@ LeakCounts LeaksOf::total() const {
 }
 
 Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays, std::uint64_t seed,
-                  const cpu::Executor& executor, bool peers) {
+                  const cpu::Executor& executor, const Beside& beside) {
   Leaks leaks;
   const std::vector<ClosedMesh> meshes = closed_meshes(scenes);
   const std::uint64_t of_mesh = (rays + meshes.size() - 1) / meshes.size();
@@ -192,19 +192,22 @@ Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays, std:
     struct Entrant {
       std::string name;
       bool peer;
+      bool watertight;
       std::unique_ptr<Runner> runner;
       std::uint64_t rays;  // as many or a block more
     };
     std::vector<Entrant> entrants;
-    for (const Setting& setting : all_settings()) {
-      if (setting.family != "intersector") continue;
+    for (const Setting& setting : all_settings(beside.cuda)) {
+      if (!is_intersector_setting(setting)) continue;
       const bool slow = setting.intersector == Intersector::exact;
-      entrants.push_back({setting.name, false, make_runner(setting, closed.mesh, executor),
+      // Moeller and Trumbore's test promises no watertightness.
+      entrants.push_back({setting.name, false, setting.intersector != Intersector::fast,
+                          make_runner(setting, closed.mesh, executor),
                           slow ? of_mesh / 16 : of_mesh});
     }
-    if (peers) {
+    if (beside.peers) {
       for (Peer& peer : make_peers(closed.mesh, executor.threads)) {
-        entrants.push_back({peer.name, true, std::move(peer.runner),
+        entrants.push_back({peer.name, true, false, std::move(peer.runner),
                             std::min(of_mesh, most_rays_of_peers / meshes.size())});
       }
     }
@@ -217,7 +220,7 @@ Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays, std:
       for (Entrant& entrant : entrants) {
         if (done >= entrant.rays) continue;
         count(*entrant.runner, closed.name, oracle, block,
-              entry(leaks, entrant.name, entrant.peer));
+              entry(leaks, entrant.name, entrant.peer, entrant.watertight));
       }
       done += block.size();
       progress.advance(block.size());

@@ -12,6 +12,7 @@
 
 #include <zkd/cpu/executor.hpp>
 
+#include "runner.hpp"
 #include "scenes.hpp"
 
 namespace zkd::bench::accuracy {
@@ -33,6 +34,7 @@ struct LeakCounts {
 struct LeaksOf {
   std::string name;  ///< the intersector, or "embree-..."
   bool peer = false;
+  bool watertight = false;  ///< it is promised that nothing leaks
   std::array<LeakCounts, target_kinds> of_target{};
   std::string first_leak;  ///< mesh and ray of the first; empty if there is none
 
@@ -47,6 +49,7 @@ struct Leaks {
 /// About `rays` rays on generated closed meshes and on those of `scenes` that are closed, for
 /// each intersector (`exact`: a sixteenth). Peers get as many, 10^7 at most.
 [[nodiscard]] Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays,
-                                std::uint64_t seed, const cpu::Executor& executor, bool peers);
+                                std::uint64_t seed, const cpu::Executor& executor,
+                                const Beside& beside);
 
 }  // namespace zkd::bench::accuracy

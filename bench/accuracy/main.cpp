@@ -16,6 +16,7 @@
 
 #include <zkd/error.hpp>
 
+#include "cuda.hpp"
 #include "exit_status.hpp"
 #include "machine.hpp"
 #include "options.hpp"
@@ -52,7 +53,7 @@ std::vector<TestScene> load_scenes(const Options& options) {
 
 // Exact answers are asked for here and nowhere else; they serve the curves, E1, E2, E4 and E6.
 void measure_scene(const TestScene& scene, const Options& options, const cpu::Executor& executor,
-                   Report& report) {
+                   const Beside& beside, Report& report) {
   const verify::Oracle oracle(scene.mesh.view(), verify::Oracle::Search::box_tree);
   const std::vector<RaySet> sets = ray_sets(scene, oracle, executor, options.size, options.seed);
   for (const RaySet& set : sets) {
@@ -61,7 +62,7 @@ void measure_scene(const TestScene& scene, const Options& options, const cpu::Ex
   if (options.measures.contains(Measure::curves)) {
     CurveOptions curve_options;
     curve_options.repeat = options.repeat;
-    curve_options.peers = options.peers;
+    curve_options.beside = beside;
     const std::vector<Point> points = measure_curves(scene, sets, oracle, executor, curve_options);
     report.add_errors(points);
     report.points.insert(report.points.end(), points.begin(), points.end());
@@ -105,6 +106,9 @@ int run(const Options& options) {
   executor.threads = options.threads > 0 ? options.threads : omp_get_max_threads();
   Report report;
   report.machine = describe_machine(executor.threads);
+  const Where where = resolve(options.backend);
+  const Beside beside{.peers = options.peers, .cuda = where.backend == Backend::cuda};
+  if (beside.cuda) describe_device(report.machine);
 
   // Before anything is measured, so that a bad path costs no minutes.
   const bool json_only = options.json && *options.json == "-";
@@ -122,15 +126,17 @@ int run(const Options& options) {
   for (const TestScene& scene : scenes) report.scenes.push_back(scene.name);
   const auto asked = [&](Measure measure) { return options.measures.contains(measure); };
   if (asked(Measure::curves) || asked(Measure::e6) || options.plots) {
-    for (const TestScene& scene : scenes) measure_scene(scene, options, executor, report);
+    for (const TestScene& scene : scenes) measure_scene(scene, options, executor, beside, report);
   }
   if (asked(Measure::e3)) {
-    report.e3 = compare_with_brute_force(options.brute_force, options.seed, executor.threads);
+    report.e3 =
+        compare_with_brute_force(options.brute_force, options.seed, executor.threads, beside.cuda);
   }
   if (asked(Measure::e5)) {
-    report.e5 = count_leaks(scenes, options.leaks, options.seed, executor, options.peers);
+    report.e5 = count_leaks(scenes, options.leaks, options.seed, executor, beside);
   }
-  if (asked(Measure::e7)) report.e7 = compare_hashes(scenes, options.meshes, options.seed);
+  if (asked(Measure::e7))
+    report.e7 = compare_hashes(scenes, options.meshes, options.seed, beside.cuda);
 
   const std::string json = to_json(report, options);
   if (options.json && !json_only) write(*options.json, "--json", json);

@@ -10,6 +10,7 @@
 
 #include <zkd/config.hpp>
 
+#include "choices.hpp"
 #include "command_line.hpp"
 
 namespace zkd::bench::accuracy {
@@ -40,9 +41,7 @@ constexpr std::array<std::pair<std::string_view, Measure>, 8> measure_names{
 
 std::set<Measure> measures_listed(std::string_view list) {
   std::set<Measure> measures;
-  for (;;) {
-    const std::size_t comma = list.find(',');
-    const std::string_view name = list.substr(0, comma);
+  for (const std::string_view name : parts_of(list)) {
     const auto* const found = std::find_if(measure_names.begin(), measure_names.end(),
                                            [&](const auto& entry) { return entry.first == name; });
     if (found == measure_names.end()) {
@@ -50,9 +49,8 @@ std::set<Measure> measures_listed(std::string_view list) {
                        "' is not one of e1, e2, e3, e4, e5, e6, e7, curves");
     }
     measures.insert(found->second);
-    if (comma == std::string_view::npos) return measures;
-    list.remove_prefix(comma + 1);
   }
+  return measures;
 }
 
 std::string by_preset(std::int64_t quick, std::int64_t normal, std::int64_t full) {
@@ -67,6 +65,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   bool quick = false;
   bool full = false;
   std::string measures = "e1,e2,e3,e4,e5,e6,e7,curves";
+  std::string backend = zkd::to_string(options.backend);
   std::string peers = "embree";
   std::string json;
   std::string plots;
@@ -111,6 +110,11 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
          most_rays);
   preset("--leaks", &Preset::leaks, "Rays of E5, from inside closed meshes", 1, most_rays);
   preset("--meshes", &Preset::meshes, "Small meshes of E7", 1, 1'000'000);
+  app.add_option("--backend", backend,
+                 "Which zkd: cpu; cuda: the device too; auto: the device too if one answers")
+      ->group(measure)
+      ->type_name("WHICH")
+      ->capture_default_str();
   number("--threads", threads, "CPU threads; 0: all", 0, 4096);
   number("--seed", seed, "Of everything that is random", 0, std::int64_t{0x7FFFFFFFFFFFFFFF});
   app.add_option("--peers", peers, "Others to measure beside: embree (where built with it), none")
@@ -129,17 +133,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
                  "Write the Pareto table in Markdown: between the markers of FILE, or a new FILE")
       ->group(report)
       ->type_name("FILE");
-  app.footer(
-      "Exit status: 0 done; 1 a check failed; 2 bad input or usage; 3 device or memory failure.");
-
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& done) {
-    app.exit(done);
-    return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw UsageError(one_line(error.what()));
-  }
+  app.footer(exit_status_help);
+  if (!parse(app, argc, argv)) return std::nullopt;
   if (peers != "embree" && peers != "none") {
     throw UsageError("--peers: '" + peers + "' is not one of embree, none");
   }
@@ -157,6 +152,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   options.meshes = static_cast<std::uint64_t>(chosen("--meshes", &Preset::meshes));
   options.seed = static_cast<std::uint64_t>(seed);
   options.threads = static_cast<int>(threads);
+  options.backend = value_named(all_backends, "--backend", backend);
   options.peers = peers == "embree";
   options.first_scene_only = quick;
   if (app.count("--json") > 0) options.json = json;

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include <zkd/options.hpp>
+
 #include "usage_error.hpp"
 
 namespace zkd::bench::accuracy {
@@ -28,7 +30,8 @@ struct Options {
   std::uint64_t leaks = 0;        ///< rays of E5
   std::uint64_t meshes = 0;       ///< small meshes of E7
   std::uint64_t seed = 1;
-  int threads = 0;  ///< 0: all
+  int threads = 0;                       ///< 0: all
+  Backend backend = Backend::automatic;  ///< the CPU is always measured; cuda: the device as well
   bool peers = true;
   bool first_scene_only = false;  ///< of the paper's
 

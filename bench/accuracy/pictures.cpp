@@ -88,7 +88,7 @@ void write_vertex_leaks(const std::filesystem::path& folder, unsigned rays, std:
                         const cpu::Executor& executor) {
   const scene::Mesh mesh = scene::sphere(4);
   std::vector<Peer> entrants;
-  entrants.push_back({"zkd", make_runner(all_settings().front(), mesh, executor)});
+  entrants.push_back({"zkd", make_runner(all_settings(false).front(), mesh, executor)});
   for (Peer& peer : make_peers(mesh, executor.threads)) entrants.push_back(std::move(peer));
 
   // Rays start near the centre, each somewhere else.

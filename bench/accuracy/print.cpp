@@ -66,7 +66,8 @@ void print_errors(std::ostream& out, const Report& report) {
 void print_e3(std::ostream& out, const TreeAgainstLoops& e3) {
   line(out, "\nE3, tree against brute force, bit by bit: %llu trees", ull(e3.cases));
   for (const TreeAgainstLoop& one : e3.of_intersector) {
-    line(out, "%-29s%12llu rays%18s different%18s any hit", one.intersector.c_str(), ull(one.rays),
+    if (one.rays == 0) continue;
+    line(out, "%-29s%12llu rays%18s different%18s any hit", one.name.c_str(), ull(one.rays),
          seen(one.different, one.rays).c_str(), seen(one.any_hit_different, one.rays).c_str());
   }
 }

@@ -9,7 +9,7 @@ namespace zkd::bench::accuracy {
 
 void Report::add_errors(const std::vector<Point>& of_scene) {
   for (const Point& point : of_scene) {
-    if (point.family != "intersector" && !point.peer) continue;
+    if (!point.by_intersector && !point.peer) continue;
     const auto found = std::find_if(errors.begin(), errors.end(), [&](const ErrorsOf& one) {
       return one.name == point.setting && one.rays == point.rays;
     });
@@ -44,9 +44,7 @@ std::vector<std::string> Report::failures() const {
     count(e3->different(), "differences between tree and brute force: " + e3->first_difference);
   if (e5) {
     for (const LeaksOf& one : e5->of) {
-      // Moeller and Trumbore's test promises no watertightness.
-      const bool watertight = !one.peer && one.name != zkd::to_string(Intersector::fast);
-      if (watertight) count(one.total().leaks, one.name + " leaks: " + one.first_leak);
+      if (one.watertight) count(one.total().leaks, one.name + " leaks: " + one.first_leak);
     }
   }
   if (e7) count(e7->hashes_too_many, "hashes too many: " + e7->first_offender);

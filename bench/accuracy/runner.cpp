@@ -1,17 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// zkd with one setting, and Embree.
+// zkd with one setting on either backend, and Embree.
 #include "runner.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <zkd/build.hpp>
 
 #include "contender.hpp"
+#include "cuda.hpp"
 #include "peers_embree.hpp"
 
 namespace zkd::bench::accuracy {
 namespace {
+
+double references_per_triangle(const TreeView& tree, const TriangleView& triangles) {
+  return static_cast<double>(tree.reference_count()) /
+         static_cast<double>(std::max<std::size_t>(1, triangles.triangle_count));
+}
 
 class ZkdRunner final : public Runner {
  public:
@@ -25,16 +32,17 @@ class ZkdRunner final : public Runner {
     return watch.ms();
   }
 
-  void closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
+  double closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
+    const Stopwatch watch;
     accuracy::closest_hit(setting_.walk, setting_.intersector, executor_, tree_.view(), triangles_,
                           rays, hits);
+    return watch.ms();
   }
 
   void clear() override { tree_ = Tree(); }
 
   [[nodiscard]] double references_per_triangle() const override {
-    return static_cast<double>(tree_.view().reference_count()) /
-           static_cast<double>(std::max<std::size_t>(1, triangles_.triangle_count));
+    return accuracy::references_per_triangle(tree_.view(), triangles_);
   }
 
  private:
@@ -44,6 +52,38 @@ class ZkdRunner final : public Runner {
   Tree tree_;
 };
 
+// The device keeps a tree, its workspace and a copy of the triangles only from build() to clear():
+// there are more settings than would fit at once.
+class CudaRunner final : public Runner {
+ public:
+  CudaRunner(const Setting& setting, const scene::Mesh& mesh)
+      : setting_(setting), triangles_(mesh.view()) {}
+
+  double build() override {
+    clear();
+    const std::span<const BuildOptions> one(&setting_.build, 1);
+    contender_ = std::move(cuda_contenders(triangles_, one, setting_.intersector).front());
+    Result result;
+    contender_->describe(result);
+    return contender_->build();
+  }
+
+  double closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
+    return contender_->closest_hit(rays, hits);
+  }
+
+  void clear() override { contender_.reset(); }
+
+  [[nodiscard]] double references_per_triangle() const override {
+    return accuracy::references_per_triangle(contender_->tree().view(), triangles_);
+  }
+
+ private:
+  Setting setting_;
+  TriangleView triangles_;
+  std::unique_ptr<ZkdContender> contender_;
+};
+
 #if defined(ZKD_BENCH_EMBREE)
 class PeerRunner final : public Runner {
  public:
@@ -51,8 +91,10 @@ class PeerRunner final : public Runner {
       : contender_(std::move(contender)) {}
 
   double build() override { return contender_->build(); }
-  void closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
+  double closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
+    const Stopwatch watch;
     contender_->closest_hit(rays, hits);
+    return watch.ms();
   }
   void clear() override { contender_->clear(); }
   [[nodiscard]] double references_per_triangle() const override { return 0.0; }
@@ -66,6 +108,7 @@ class PeerRunner final : public Runner {
 
 std::unique_ptr<Runner> make_runner(const Setting& setting, const scene::Mesh& mesh,
                                     const cpu::Executor& executor) {
+  if (setting.cuda) return std::make_unique<CudaRunner>(setting, mesh);
   return std::make_unique<ZkdRunner>(setting, mesh, executor);
 }
 

@@ -28,11 +28,18 @@ class Runner {
 
   /// Milliseconds from raw arrays to something that can be traced. What was built before is gone.
   virtual double build() = 0;
-  /// Nearest hits, on all threads.
-  virtual void closest_hit(std::span<const Ray> rays, std::span<Hit> hits) = 0;
+  /// Nearest hits, on all threads or the device; returns milliseconds, without those of copies to
+  /// and from a device.
+  virtual double closest_hit(std::span<const Ray> rays, std::span<Hit> hits) = 0;
   virtual void clear() = 0;
   /// 0 where that is not known.
   [[nodiscard]] virtual double references_per_triangle() const = 0;
+};
+
+/// What is measured beside zkd on the CPU.
+struct Beside {
+  bool peers = true;
+  bool cuda = false;  ///< zkd on the current device
 };
 
 /// `mesh` must outlive it.

@@ -3,16 +3,36 @@
 // The list of settings.
 #include "settings.hpp"
 
+#include <utility>
+
+#include "choices.hpp"
+
 namespace zkd::bench::accuracy {
 
-std::vector<Setting> all_settings() {
+namespace {
+
+// What a device has too: it knows neither other walks than the library's nor the exact intersector.
+void add_cuda(std::vector<Setting>& settings) {
+  const std::vector<Setting> of_cpu = settings;
+  for (Setting setting : of_cpu) {
+    if (setting.walk != Walk::library || setting.intersector == Intersector::exact) continue;
+    setting.family = "cuda " + setting.family;
+    setting.name = "cuda " + setting.name;
+    setting.cuda = true;
+    settings.push_back(std::move(setting));
+  }
+}
+
+}  // namespace
+
+std::vector<Setting> all_settings(bool cuda) {
   BuildOptions base;
   base.invalid_triangles = InvalidTriangles::skip;
   std::vector<Setting> settings;
   const auto add = [&](const char* family, const std::string& name, const BuildOptions& build,
                        Walk walk = Walk::library,
                        Intersector intersector = Intersector::watertight) {
-    settings.push_back({family, name, build, walk, intersector});
+    settings.push_back({family, name, build, walk, intersector, false});
   };
 
   for (const Intersector intersector : all_intersectors) {
@@ -49,7 +69,12 @@ std::vector<Setting> all_settings() {
     }
   }
   add("literal", "literal", base, Walk::literal);
+  if (cuda) add_cuda(settings);
   return settings;
+}
+
+bool is_intersector_setting(const Setting& setting) {
+  return setting.family == "intersector" || setting.family == "cuda intersector";
 }
 
 }  // namespace zkd::bench::accuracy

@@ -3,7 +3,6 @@
 // The settings that run time and error are measured for.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -18,18 +17,19 @@ namespace zkd::bench::accuracy {
 inline constexpr const char* default_setting = "watertight";
 
 struct Setting {
-  std::string family;  ///< which line of the plots it belongs to: "bits", "codes", "leaf", ...
+  std::string family;  ///< which line of the plots it belongs to: "bits", "cuda leaf", ...
   std::string name;    ///< unique: "bits 5", "leaf 8", "naive all", ...
   BuildOptions build;
   Walk walk = Walk::library;
   Intersector intersector = Intersector::watertight;  ///< of the library's walk
+  bool cuda = false;                                  ///< on the device; the library's walk only
 };
 
-inline constexpr std::array all_intersectors{Intersector::watertight, Intersector::fast,
-                                             Intersector::single_precision,
-                                             Intersector::double_precision, Intersector::exact};
+/// All of them, one family after another; the first is default_setting. With `cuda`, those that a
+/// device has follow once more, their names and families beginning with "cuda ".
+[[nodiscard]] std::vector<Setting> all_settings(bool cuda);
 
-/// All of them, one family after another; the first is default_setting.
-[[nodiscard]] std::vector<Setting> all_settings();
+/// Whether it differs from default_setting, if at all, in intersector and backend alone.
+[[nodiscard]] bool is_intersector_setting(const Setting& setting);
 
 }  // namespace zkd::bench::accuracy

@@ -17,7 +17,8 @@ constexpr const char* end_marker = "<!-- table: end -->";
 
 // What a reader looks for even where something beats it.
 bool is_landmark(const Point& point) {
-  return point.peer || point.setting == default_setting || point.family == "literal";
+  return point.peer || point.setting == default_setting ||
+         point.setting == std::string("cuda ") + default_setting || point.family == "literal";
 }
 
 std::string with(const char* format, double value) {

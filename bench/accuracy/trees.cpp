@@ -7,7 +7,6 @@
 #include <set>
 
 #include <zkd/build.hpp>
-#include <zkd/error.hpp>
 #include <zkd/query.hpp>
 
 #include "scene/generate.hpp"
@@ -30,7 +29,10 @@ BuildOptions options_with(References references) {
 
 class HashComparison {
  public:
-  explicit HashComparison(std::uint64_t seed) : seed_(seed) { result_.backends = {"cpu"}; }
+  HashComparison(std::uint64_t seed, bool cuda) : seed_(seed), cuda_(cuda) {
+    result_.backends = {"cpu"};
+    if (cuda) result_.backends.push_back("cuda");
+  }
 
   void compare(const std::string& name, const scene::Mesh& mesh, References references) {
     const BuildOptions options = options_with(references);
@@ -71,18 +73,12 @@ class HashComparison {
   void add_cuda(const scene::Mesh& mesh, BuildOptions options, std::set<std::string>& hashes) {
     if (!cuda_) return;
     options.backend = Backend::cuda;
-    try {
-      hashes.insert(verify::tree_hash(zkd::build(mesh.view(), options).view()));
-      ++result_.builds;
-      if (result_.backends.size() == 1) result_.backends.push_back("cuda");
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::backend_unavailable) throw;
-      cuda_ = false;
-    }
+    hashes.insert(verify::tree_hash(zkd::build(mesh.view(), options).view()));
+    ++result_.builds;
   }
 
   std::uint64_t seed_;
-  bool cuda_ = true;
+  bool cuda_;
   Determinism result_;
 };
 
@@ -133,8 +129,8 @@ std::vector<TreeQuality> measure_quality(const TestScene& scene, const std::vect
 }
 
 Determinism compare_hashes(const std::vector<TestScene>& scenes, std::uint64_t small_meshes,
-                           std::uint64_t seed) {
-  HashComparison comparison(seed);
+                           std::uint64_t seed, bool cuda) {
+  HashComparison comparison(seed, cuda);
   scene::Progress progress("hashes", small_meshes + scenes.size());
   const auto compare = [&](const std::string& name, const scene::Mesh& mesh) {
     for (const References references : {References::once, References::all}) {

@@ -43,9 +43,8 @@ struct Determinism {
 };
 
 /// The scenes and `small_meshes` small meshes, each built on 1, 2, 3 and 8 threads in both
-/// instruction sets, on CUDA where this program has it and a device answers, and with its triangles
-/// in two other orders.
+/// instruction sets, with `cuda` on the device, and with its triangles in two other orders.
 [[nodiscard]] Determinism compare_hashes(const std::vector<TestScene>& scenes,
-                                         std::uint64_t small_meshes, std::uint64_t seed);
+                                         std::uint64_t small_meshes, std::uint64_t seed, bool cuda);
 
 }  // namespace zkd::bench::accuracy

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The names of options, intersectors, stages and skips.
+#include <zkd/cpu/executor.hpp>
 #include <zkd/options.hpp>
 #include <zkd/query.hpp>
 #include <zkd/statistics.hpp>
@@ -39,6 +40,9 @@ const char* to_string(AxisOrder value) noexcept {
 }
 const char* to_string(Intersector value) noexcept {
   return name_of(std::array{"watertight", "fast", "single", "double", "exact"}, value);
+}
+const char* cpu::to_string(InstructionSet value) noexcept {
+  return name_of(std::array{"auto", "portable", "avx2"}, value);
 }
 const char* to_string(Stage stage) noexcept {
   return name_of(std::array{"validate", "encode", "sort", "recode", "trunks", "essential_nodes",

@@ -191,6 +191,19 @@ double separation(const Corners& corners, const ExactBox& box) {
   return widest;
 }
 
+double normal_condition(const Corners& corners) {
+  const int exponent = common_exponent({corners[0], corners[1], corners[2]});
+  const IntegerPoint a(corners[0], exponent);
+  const IntegerPoint ab = IntegerPoint(corners[1], exponent) - a;
+  const IntegerPoint bc = IntegerPoint(corners[2], exponent) - IntegerPoint(corners[1], exponent);
+  const IntegerPoint normal = cross(ab, bc);
+  const mpz_class products = abs(ab.y * bc.z) + abs(ab.z * bc.y) + abs(ab.z * bc.x) +
+                             abs(ab.x * bc.z) + abs(ab.x * bc.y) + abs(ab.y * bc.x);
+  const mpz_class length = sqrt(dot(normal, normal));
+  if (length == 0) return std::numeric_limits<double>::infinity();
+  return mpq_class(products, length).get_d();
+}
+
 namespace {
 
 // In units of a power of two.

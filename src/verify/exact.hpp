@@ -45,6 +45,10 @@ struct ExactBox {
 /// distance up to rounding, and not positive (up to rounding) where they overlap.
 [[nodiscard]] double separation(const Corners& corners, const ExactBox& box);
 
+/// How far the products that make the triangle's normal cancel: their magnitudes, summed, over the
+/// length of the exact normal. At least 1; large for slivers; infinite for zero area.
+[[nodiscard]] double normal_condition(const Corners& corners);
+
 /// The exact sign (-1, 0, 1) of det(d, a - o, b - o).
 [[nodiscard]] int determinant_sign(const Point& d, const Point& o, const Point& a, const Point& b);
 

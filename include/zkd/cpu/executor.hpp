@@ -16,6 +16,9 @@ enum class InstructionSet {
   avx2,       ///< AVX2, FMA and BMI2; falls back to portable where the processor lacks them
 };
 
+/// "auto", "portable" or "avx2": the names used on command lines and in JSON. Static storage.
+ZKD_API const char* to_string(InstructionSet value) noexcept;
+
 /// Passed to build(), to queries over spans and to stages. A value: copy it freely. One executor
 /// may be used by several threads at once if its memory resource may.
 struct Executor {
