@@ -102,7 +102,7 @@ void teapot_in_a_stadium(const Setting& setting, const Yield& yield) {
   for (const float ratio : {1e3F, 1e4F, 1e5F, 1e6F, 1e7F}) {
     Mesh mesh = scene::joined(
         scene::offset(scene::small_in_large(0, ratio, setting.seed), glm::vec3(-0.375F * ratio)),
-        scene::soup(setting.pick(2000u, 300000u), setting.seed));
+        scene::soup(setting.pick(2000u, 150000u), setting.seed));
     Case made = hard_case("ratio " + std::to_string(static_cast<int>(ratio)), std::move(mesh),
                           setting.size == Size::small ? once_and_all() : only_once(),
                           setting.pick(1200u, 2000u));

@@ -37,11 +37,11 @@ void far_from_the_origin(const Setting& setting, const Yield& yield) {
       const std::string name = " at " + std::to_string(by);
       yield(hard_case(
           "soup" + name,
-          scene::offset(scene::scaled(scene::soup(setting.pick(200u, 100000u), setting.seed), 5),
+          scene::offset(scene::scaled(scene::soup(setting.pick(200u, 40000u), setting.seed), 5),
                         place),
           some_options(setting), setting.pick(900u, 4000u)));
       yield(hard_case("sphere" + name,
-                      scene::offset(scene::scaled(scene::sphere(setting.pick(2u, 6u)), 3), place),
+                      scene::offset(scene::scaled(scene::sphere(setting.pick(2u, 5u)), 3), place),
                       some_options(setting), setting.pick(900u, 4000u)));
     }
   }
@@ -121,7 +121,7 @@ void same_when_flushing(const Traced& traced, Findings& findings) {
 }
 
 void scales(const Setting& setting, const Yield& yield) {
-  const std::uint32_t count = setting.pick(200u, 20000u);
+  const std::uint32_t count = setting.pick(200u, 10000u);
   // 2^-60 is about 1e-18, 2^50 about 1e15; further out coordinates overflow or go denormal.
   for (const int exponent : {-120, -60, -40, -20, -1, 1, 20, 40, 50, 100}) {
     for (const bool closed : {false, true}) {

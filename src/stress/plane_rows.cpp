@@ -24,7 +24,7 @@ std::vector<BuildOptions> some_options(const Setting& setting) {
 void walls_on_planes(const Setting& setting, const Yield& yield) {
   for (const std::uint32_t cells : {1u, 2u, 4u, setting.pick(5u, 32u)}) {
     yield(hard_case(std::to_string(cells) + " cells a side", scene::grid(cells),
-                    some_options(setting), setting.pick(1800u, 12000u)));
+                    some_options(setting), setting.pick(1800u, 6000u)));
   }
 }
 
@@ -46,7 +46,7 @@ void planes_off_by_rounding(const Setting& setting, const Yield& yield) {
 void vertices_beside_planes(const Setting& setting, const Yield& yield) {
   for (const std::uint32_t cells : {2u, 8u, 64u}) {
     Random random(setting.seed + cells);
-    Mesh mesh = scene::soup(setting.pick(300u, 50000u), setting.seed);
+    Mesh mesh = scene::soup(setting.pick(300u, 20000u), setting.seed);
     const auto side = static_cast<float>(cells);
     for (glm::vec3& p : mesh.positions) {
       for (int a = 0; a < 3; ++a) {
@@ -66,7 +66,7 @@ void straddling_zero(const Setting& setting, const Yield& yield) {
   for (const std::uint32_t far : {1u, 2u, 4u}) {  // one coordinate in so many
     for (const float size : {1.0F, 0x1p-100F, 0x1p+60F}) {
       Random random(setting.seed + far);
-      Mesh mesh = scene::soup(setting.pick(200u, 20000u), setting.seed);
+      Mesh mesh = scene::soup(setting.pick(200u, 10000u), setting.seed);
       for (glm::vec3& p : mesh.positions) {
         for (int a = 0; a < 3; ++a) {
           p[a] = random.one_in(far) ? size * (2.0F * p[a] - 1.0F)

@@ -38,10 +38,10 @@ RaySource each(const std::function<Ray(RayMaker&)>& make) {
 void at_meshes(const Setting& setting, const Yield& yield,
                const std::function<Ray(RayMaker&)>& make, std::uint32_t small_count,
                std::uint32_t large_count) {
-  const std::uint32_t count = setting.pick(300u, 50000u);
+  const std::uint32_t count = setting.pick(300u, 20000u);
   std::vector<scene::NamedMesh> meshes;
   meshes.push_back({"soup", scene::soup(count, setting.seed)});
-  meshes.push_back({"sphere", scene::sphere(setting.pick(2u, 6u))});
+  meshes.push_back({"sphere", scene::sphere(setting.pick(2u, 5u))});
   meshes.push_back({"grid", scene::grid(setting.pick(3u, 16u))});
   meshes.push_back({"integers", scene::integer_mesh(count / 4, 4, setting.seed)});
   meshes.push_back({"slivers", scene::slivers(count, 1e5F, setting.seed)});
@@ -67,7 +67,7 @@ struct Closed {
 };
 
 std::vector<Closed> closed_surfaces(const Setting& setting) {
-  const std::uint32_t finest = setting.pick(3u, 7u);
+  const std::uint32_t finest = setting.pick(3u, 6u);
   std::vector<Closed> all;
   for (std::uint32_t subdivisions = 0; subdivisions <= finest; ++subdivisions) {
     all.push_back({"sphere " + std::to_string(subdivisions), scene::sphere(subdivisions),
@@ -94,7 +94,7 @@ void from_inside(const Setting& setting, const Yield& yield,
                  const std::function<glm::vec3(RayMaker&)>& target) {
   for (Closed& surface : closed_surfaces(setting)) {
     Case made = hard_case(surface.name, std::move(surface.mesh), once_and_all(),
-                          setting.pick(2000u, 200000u));
+                          setting.pick(2000u, 60000u));
     made.hits = Case::Hits::all;
     made.oracle_rays = setting.pick(0u, 3000u);
     made.rays = each([target, centre = surface.centre, clear = surface.clear](RayMaker& maker) {
@@ -121,8 +121,7 @@ void to_targets_beside(const Setting& setting, const Yield& yield) {
 
 void along_axes(const Setting& setting, const Yield& yield) {
   at_meshes(
-      setting, yield, [](RayMaker& maker) { return maker.along_axis(maker.vertex()); }, 900,
-      100000);
+      setting, yield, [](RayMaker& maker) { return maker.along_axis(maker.vertex()); }, 900, 40000);
 }
 
 void along_axes_beside(const Setting& setting, const Yield& yield) {
@@ -135,12 +134,12 @@ void along_axes_beside(const Setting& setting, const Yield& yield) {
         if (maker.random().one_in(2)) through = maker.moved(through, 1);
         return maker.along_axis(through);
       },
-      900, 100000);
+      900, 40000);
 }
 
 void in_split_planes(const Setting& setting, const Yield& yield) {
   at_meshes(
-      setting, yield, [](RayMaker& maker) { return maker.in_plane(); }, 900, 100000);
+      setting, yield, [](RayMaker& maker) { return maker.in_plane(); }, 900, 40000);
 }
 
 void through_cell_corners(const Setting& setting, const Yield& yield) {
@@ -150,12 +149,12 @@ void through_cell_corners(const Setting& setting, const Yield& yield) {
         const glm::vec3 to = maker.cell_corner();
         return ray_between(maker.random().one_in(4) ? maker.cell_corner() : maker.around(), to);
       },
-      900, 100000);
+      900, 40000);
 }
 
 void near_parallel(const Setting& setting, const Yield& yield) {
   at_meshes(
-      setting, yield, [](RayMaker& maker) { return maker.nearly_parallel(); }, 900, 100000);
+      setting, yield, [](RayMaker& maker) { return maker.nearly_parallel(); }, 900, 40000);
 }
 
 // ---- 46 -----------------------------------------------------------------------------------------
@@ -194,14 +193,14 @@ std::vector<Ray> far_and_near(const Mesh& mesh, const TreeView& tree, std::uint3
 }
 
 void from_afar(const Setting& setting, const Yield& yield) {
-  const std::uint32_t count = setting.pick(400u, 100000u);
+  const std::uint32_t count = setting.pick(400u, 30000u);
   std::vector<scene::NamedMesh> meshes;
   meshes.push_back({"soup", scene::soup(count, setting.seed)});
   meshes.push_back({"sphere", scene::sphere(setting.pick(3u, 6u))});
   meshes.push_back({"far soup", scene::offset(scene::soup(count, setting.seed), {1000, -500, 0})});
   for (scene::NamedMesh& mesh : meshes) {
     Case made =
-        hard_case(mesh.name, std::move(mesh.mesh), once_and_all(), setting.pick(4000u, 100000u));
+        hard_case(mesh.name, std::move(mesh.mesh), once_and_all(), setting.pick(4000u, 30000u));
     made.rays = far_and_near;
     made.oracle_rays = setting.pick(0u, 3000u);
     made.also = [](const Traced& traced, Findings& findings) {
@@ -248,14 +247,14 @@ Ray grazing_ray(const Mesh& mesh, RayMaker& maker, float most_tangent) {
 void grazing(const Setting& setting, const Yield& yield) {
   for (const float tangent : {0.0087F, 1.7e-5F, 1e-7F}) {  // of 0.5 and 0.001 degrees, and less
     std::vector<scene::NamedMesh> meshes;
-    meshes.push_back({"soup", scene::soup(setting.pick(300u, 50000u), setting.seed)});
+    meshes.push_back({"soup", scene::soup(setting.pick(300u, 20000u), setting.seed)});
     meshes.push_back({"sphere", scene::sphere(setting.pick(3u, 6u))});
     meshes.push_back({"grid", scene::grid(setting.pick(3u, 12u))});
-    meshes.push_back({"slivers", scene::slivers(setting.pick(300u, 50000u), 1e3F, setting.seed)});
+    meshes.push_back({"slivers", scene::slivers(setting.pick(300u, 20000u), 1e3F, setting.seed)});
     for (scene::NamedMesh& mesh : meshes) {
       Case made =
           hard_case(mesh.name + ", tangent " + std::to_string(tangent), std::move(mesh.mesh),
-                    some_options(setting), setting.pick(1200u, 50000u));
+                    some_options(setting), setting.pick(1200u, 20000u));
       made.oracle_rays = setting.pick(0u, 3000u);
       made.rays = [tangent](const Mesh& of, const TreeView& tree, std::uint32_t count,
                             std::uint64_t seed) {

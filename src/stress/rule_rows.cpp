@@ -39,7 +39,7 @@ std::vector<BuildOptions> some_options(const Setting& setting) {
 }
 
 std::vector<scene::NamedMesh> meshes(const Setting& setting) {
-  const std::uint32_t count = setting.pick(300u, 50000u);
+  const std::uint32_t count = setting.pick(300u, 20000u);
   std::vector<scene::NamedMesh> all;
   all.push_back({"soup", scene::soup(count, setting.seed)});
   all.push_back({"sphere", scene::sphere(setting.pick(2u, 6u))});
@@ -89,7 +89,7 @@ std::vector<Ray> from_surfaces(const Mesh& mesh, const TreeView& tree, std::uint
 void origins_on_surfaces(const Setting& setting, const Yield& yield) {
   for (scene::NamedMesh& mesh : meshes(setting)) {
     Case made = hard_case(mesh.name, std::move(mesh.mesh), some_options(setting),
-                          setting.pick(1800u, 100000u));
+                          setting.pick(1800u, 40000u));
     made.rays = from_surfaces;
     made.oracle_rays = setting.pick(0u, 3000u);
     made.also = [](const Traced& traced, Findings& findings) {
@@ -342,7 +342,7 @@ double ms_to_trace(const Traced& traced, std::span<const Ray> rays) {
 void no_rays(const Setting& setting, const Yield& yield) {
   for (scene::NamedMesh& mesh : meshes(setting)) {
     Case made = hard_case(mesh.name, std::move(mesh.mesh), some_options(setting),
-                          setting.pick(3000u, 200000u));
+                          setting.pick(3000u, 60000u));
     made.hits = Case::Hits::none;
     made.rays = [](const Mesh& of, const TreeView& tree, std::uint32_t count, std::uint64_t seed) {
       RayMaker maker(of, tree, seed);

@@ -22,7 +22,7 @@ using scene::Random;
 void slivers(const Setting& setting, const Yield& yield) {
   for (const float aspect : {1e2F, 1e3F, 1e4F, 1e5F, 1e6F, 1e7F}) {
     yield(hard_case("aspect " + std::to_string(static_cast<int>(aspect)),
-                    scene::slivers(setting.pick(300u, 50000u), aspect, setting.seed),
+                    scene::slivers(setting.pick(300u, 20000u), aspect, setting.seed),
                     setting.size == Size::small ? many_options() : only_once(),
                     setting.pick(1800u, 10000u)));
   }
