@@ -61,6 +61,7 @@ class Measurement {
   std::vector<Point> run() {
     std::vector<Entrant> entrants;
     for (const Setting& setting : all_settings(options_.beside.cuda)) {
+      if (options_.intersectors_only && !is_intersector_setting(setting)) continue;
       Entrant entrant;
       entrant.name = setting.name;
       entrant.family = setting.family;

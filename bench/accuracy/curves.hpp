@@ -47,6 +47,7 @@ struct CurveOptions {
   /// ray only.
   double longest_ms = 10000.0;
   Beside beside;
+  bool intersectors_only = false;  ///< of zkd the defaults alone, with each intersector
 };
 
 /// Builds and traces every setting `repeat` times, interleaved, and holds the answers of the first

@@ -59,13 +59,15 @@ void measure_scene(const TestScene& scene, const Options& options, const cpu::Ex
   for (const RaySet& set : sets) {
     report.oracle.push_back({scene.name, set.kind, set.rays.size(), set.truth->oracle_seconds()});
   }
-  if (options.measures.contains(Measure::curves)) {
+  const bool curves = options.measures.contains(Measure::curves);
+  if (curves || options.measures.contains(Measure::errors)) {
     CurveOptions curve_options;
     curve_options.repeat = options.repeat;
     curve_options.beside = beside;
+    curve_options.intersectors_only = !curves;
     const std::vector<Point> points = measure_curves(scene, sets, oracle, executor, curve_options);
     report.add_errors(points);
-    report.points.insert(report.points.end(), points.begin(), points.end());
+    if (curves) report.points.insert(report.points.end(), points.begin(), points.end());
   }
   if (options.measures.contains(Measure::e6)) {
     for (TreeQuality& quality : measure_quality(scene, sets, executor)) {
@@ -125,7 +127,7 @@ int run(const Options& options) {
   const std::vector<TestScene> scenes = load_scenes(options);
   for (const TestScene& scene : scenes) report.scenes.push_back(scene.name);
   const auto asked = [&](Measure measure) { return options.measures.contains(measure); };
-  if (asked(Measure::curves) || asked(Measure::e6) || options.plots) {
+  if (asked(Measure::curves) || asked(Measure::errors) || asked(Measure::e6) || options.plots) {
     for (const TestScene& scene : scenes) measure_scene(scene, options, executor, beside, report);
   }
   if (asked(Measure::e3)) {

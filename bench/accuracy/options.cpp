@@ -28,12 +28,12 @@ constexpr Preset quick_run{1000, 32, 1, 200'000, 400'000, 32};
 constexpr Preset normal_run{20'000, 192, 3, 5'000'000, 10'000'000, 320};
 constexpr Preset full_run{100'000, 1024, 5, 100'000'000, 100'000'000, 3200};
 
-// Names of --measures; e1, e2, e4 and curves are one measurement.
+// Names of --measures; e1, e2 and e4 are one measurement.
 constexpr std::array<std::pair<std::string_view, Measure>, 8> measure_names{
-    {{"e1", Measure::curves},
-     {"e2", Measure::curves},
+    {{"e1", Measure::errors},
+     {"e2", Measure::errors},
      {"e3", Measure::e3},
-     {"e4", Measure::curves},
+     {"e4", Measure::errors},
      {"e5", Measure::e5},
      {"e6", Measure::e6},
      {"e7", Measure::e7},

@@ -16,9 +16,10 @@
 
 namespace zkd::bench::accuracy {
 
-/// What can be measured. E1, E2 and E4 come out of the curves: the same answers, held against the
-/// same truth.
-enum class Measure { curves, e3, e5, e6, e7 };
+/// What can be measured. `errors` is E1, E2 and E4: the same answers, held against the same truth.
+/// They come out of the curves, too; without those only the settings they are told for are
+/// measured.
+enum class Measure { curves, errors, e3, e5, e6, e7 };
 
 struct Options {
   std::vector<std::string> scenes;  ///< names or files; empty: the scenes of the paper

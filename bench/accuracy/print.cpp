@@ -81,7 +81,7 @@ void print_e5(std::ostream& out, const Leaks& e5) {
       const std::string text =
           std::to_string(counts.leaks) + " (" + std::to_string(counts.double_hits) + ")";
       char cell[64];
-      std::snprintf(cell, sizeof cell, "%15s", text.c_str());
+      std::snprintf(cell, sizeof cell, " %14s", text.c_str());
       cells += cell;
     }
     line(out, "%-29s%11llu%s", one.name.c_str(), ull(one.total().rays), cells.c_str());
