@@ -44,7 +44,7 @@ TEST_F(AccuracyCli, HelpAndVersionSucceed) {
   EXPECT_EQ(help.status, 0);
   for (const char* option : {"--quick", "--full", "--measures", "--size", "--repeat", "--stress",
                              "--brute-force", "--leaks", "--meshes", "--threads", "--seed",
-                             "--peers", "--json", "--plots", "--table", "--version"}) {
+                             "--backend", "--peers", "--json", "--plots", "--table", "--version"}) {
     EXPECT_NE(help.out.find(option), std::string::npos) << option;
   }
   const Outcome version = run("--version");
@@ -58,6 +58,7 @@ TEST_F(AccuracyCli, BadUsageIsOneLineThatNamesTheOption) {
   expect_error("tetra.obj --measures e8", 2, "e8");
   expect_error("tetra.obj --measures ''", 2, "--measures");
   expect_error("tetra.obj --peers optix", 2, "optix");
+  expect_error("tetra.obj --backend vulkan", 2, "vulkan");
   expect_error("tetra.obj --quick --full", 2, "--full");
   for (const char* option : {"--size", "--repeat", "--brute-force", "--leaks", "--meshes"}) {
     expect_error(std::string("tetra.obj ") + option + " 0", 2, option);
@@ -69,6 +70,18 @@ TEST_F(AccuracyCli, BadUsageIsOneLineThatNamesTheOption) {
   expect_error("tetra.obj --json missing-folder/out.json", 2, "--json");
   expect_error("tetra.obj --table missing-folder/out.md", 2, "--table");
   expect_error("tetra.obj --plots tetra.obj/plots", 2, "--plots");
+}
+
+TEST_F(AccuracyCli, ErrorsAloneAreMeasuredOnTheIntersectorsAlone) {
+  const Json json = run_json(std::string(tiny) + " --measures e1,e4 --backend cpu");
+  EXPECT_EQ(json["curves"], Json::array());
+  EXPECT_EQ(json["e5"], nullptr);
+  std::set<std::string> names;
+  for (const Json& row : json["e1"]["rows"]) names.insert(row["name"].get<std::string>());
+  for (const char* name : {"watertight", "fast", "single", "double", "exact"}) {
+    EXPECT_TRUE(names.contains(name)) << name;
+  }
+  EXPECT_FALSE(names.contains("literal"));
 }
 
 TEST_F(AccuracyCli, JsonHasEveryKeyOfTheSchema) {

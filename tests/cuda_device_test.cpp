@@ -27,6 +27,7 @@
 
 #include "scene/generate.hpp"
 #include "support/caught.hpp"
+#include "support/frames.hpp"
 #include "support/hits.hpp"
 #include "support/meshes.hpp"
 #include "support/platform_cuda.hpp"
@@ -283,36 +284,9 @@ class Graph {
   cudaGraphExec_t executable_ = nullptr;
 };
 
-// Scenes of 2000 triangles and 6000 positions, from which to which a replay has to come.
-std::vector<test::NamedMesh> frames() {
-  std::vector<test::NamedMesh> all;
-  const auto add = [&](const char* name, scene::Mesh mesh) {
-    mesh.positions.resize(6000);
-    all.push_back({name, std::move(mesh)});
-  };
-  add("soup", scene::soup(2000, 73));
-  scene::Mesh mesh = scene::soup(2000, 73);
-  mesh.positions[3000].y = nan_value;
-  add("a NaN", mesh);
-  add("another soup", scene::soup(2000, 74));
-  mesh.positions[3000].y = 0.0F;
-  mesh.faces[77].z = 6000;
-  add("an index out of range", mesh);
-  add("crowds", scene::same_centre(2000, 75));
-  add("needles", scene::needles(2000, 76));
-  add("slivers", scene::slivers(2000, 1e3F, 77));
-  mesh = scene::soup(2000, 78);
-  for (glm::uvec3& face : mesh.faces) face = {1, 1, 2};
-  add("zero area", mesh);
-  add("stadium", scene::small_in_large(1988, 1e6F, 79));
-  add("random bits", scene::random_bits(2000, 80));
-  add("tiny", scene::scaled(scene::soup(2000, 81), -120));
-  return all;
-}
-
 // A build and rays, captured once and replayed over each frame.
 void expect_replays(const BuildOptions& options) {
-  const std::vector<test::NamedMesh> scenes = frames();
+  const std::vector<test::NamedMesh> scenes = test::frames();
   const std::vector<Ray> rays = scene::rays_at_features(scenes[0].mesh, 500, 82);
   const Array<Ray> uploaded = test::upload(rays);
   Array<Hit> hits(rays.size());
