@@ -8,6 +8,7 @@
 #include <zkd/cpu/executor.hpp>  // IWYU pragma: export
 #include <zkd/error.hpp>         // IWYU pragma: export
 #include <zkd/geometry.hpp>      // IWYU pragma: export
+#include <zkd/hits.hpp>          // IWYU pragma: export
 #include <zkd/lattice.hpp>       // IWYU pragma: export
 #include <zkd/options.hpp>       // IWYU pragma: export
 #include <zkd/query.hpp>         // IWYU pragma: export

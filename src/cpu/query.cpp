@@ -5,28 +5,21 @@
 
 #include <algorithm>
 
-#include <zkd/traversal/intersectors.hpp>
 #include <zkd/traversal/offset.hpp>
 #include <zkd/traversal/traverse.hpp>
 
-#include "core/exact/intersect.hpp"
 #include "cpu/box_test.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/instruction_set.hpp"
+#include "cpu/rays.hpp"
 #include "cpu/threads.hpp"
 
 namespace zkd {
 namespace {
 
-/// Rays that a thread takes at a time.
-constexpr std::uint32_t rays_at_once = 64;
-
-/// call<type of the intersector>()
-template <class Call>
-auto with_intersector(Intersector intersector, Call call) noexcept {
-  if (intersector == Intersector::exact) return call.template operator()<core::ExactIntersect>();
-  return core::with_intersector(intersector, call);
-}
+using cpu::for_each_ray;
+using cpu::rays_at_once;
+using cpu::with_intersector;
 
 /// read(candidate) of the walk of one ray.
 template <bool any, class Read>
@@ -42,19 +35,6 @@ auto trace_one(const TreeView& tree, const TriangleView& triangles, const Ray& r
     }
     return read(core::trace<any, core::BoxTest, Intersect>(tree, triangles, ray, nullptr));
   });
-}
-
-/// work(i) for every ray i. A pass counts in 32 bits: longer spans are done in several.
-template <class Work>
-void for_each_ray(const cpu::Threads& threads, std::size_t count, std::uint32_t at_once,
-                  Work work) noexcept {
-  constexpr std::size_t most = std::size_t{1} << 30;
-  for (std::size_t done = 0; done < count; done += most) {
-    const auto n = static_cast<std::uint32_t>(std::min(most, count - done));
-    threads.share(n, at_once, [=](cpu::Range range) {
-      for (std::size_t i = done + range.begin; i < done + range.end; ++i) work(i);
-    });
-  }
 }
 
 /// write(i, candidate) for the walk of every ray i.

@@ -23,6 +23,11 @@ struct Candidate {
   std::uint32_t triangle = no_triangle;
 
   [[nodiscard]] ZKD_HOST_DEVICE bool found() const { return triangle != no_triangle; }
+
+  /// Nearer, or as near and of a lower id. Any hit comes before none.
+  [[nodiscard]] ZKD_HOST_DEVICE bool before(const Candidate& other) const {
+    return t < other.t || (t == other.t && triangle < other.triangle);
+  }
 };
 
 /// Where a ray's line meets a triangle: t in tree space, and u, v as in Hit.
@@ -39,6 +44,10 @@ ZKD_HOST_DEVICE inline Real limit_behind(Wide t) {
   const Real rounded = static_cast<float>(t.value);
   return rounded + Real(slack) * magnitude(rounded) + Real(1.0e-37F);
 }
+
+/// What lies before a hit for certain, likewise: a box that ends there holds no hit behind it.
+ZKD_HOST_DEVICE inline Real limit_before(Wide t) { return -limit_behind(-t); }
+ZKD_HOST_DEVICE inline Real limit_before(const Candidate& hit) { return limit_before(hit.t); }
 
 /// A barycentric coordinate as it is answered: never -0.
 ZKD_HOST_DEVICE inline float as_coordinate(Wide x) {

@@ -23,6 +23,11 @@ namespace zkd::core {
 struct Entries {
   float t[2];
   std::uint32_t hit;  ///< bit 0: child 0, bit 1: child 1
+
+  /// Of two children that are met, the one that is entered first.
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t near(const Node& node, const PreparedRay& ray) const {
+    return t[1] < t[0] || (t[1] == t[0] && ray.is_negative(node.axis)) ? 1 : 0;
+  }
 };
 
 /// A ray against the two boxes of a node. A backend may bring its own, and its own way to read a
@@ -85,9 +90,7 @@ ZKD_HOST_DEVICE inline typename Intersect::Candidate traverse(const TreeView& tr
       const Real last = smaller(ray.last, best.limit);
       const Entries entries = boxes(node, last);
       if (entries.hit == 3) {
-        const bool upper_first = entries.t[1] < entries.t[0] ||
-                                 (entries.t[1] == entries.t[0] && ray.is_negative(node.axis));
-        const std::uint32_t near = upper_first ? 1 : 0;
+        const std::uint32_t near = entries.near(node, ray);
         stack[waiting++] = {element(node.child, 1 - near).bits, element(entries.t, 1 - near)};
         link = element(node.child, near);
       } else if (entries.hit != 0) {

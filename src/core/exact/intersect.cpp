@@ -86,7 +86,8 @@ bool ExactIntersect::decide(const Corners& corners, std::uint32_t id, Candidate&
   if (!all_finite(corners) || !crosses(corners)) return false;
   Candidate candidate(ray_, corners, id);
   if (!candidate.within(ray_.t_min, ray_.t_max) || !candidate.before(best)) return false;
-  candidate.limit = limit(candidate.at_most());
+  candidate.limit = limit_behind(in_tree_space(candidate.at_most(), 1.0));
+  candidate.begin = limit_before(in_tree_space(candidate.at_least(), -1.0));
   best = candidate;
   return true;
 }
@@ -121,11 +122,11 @@ bool ExactIntersect::crosses(const Corners& corners) const {
   return positive != negative;
 }
 
-/// Not less than the caller's t in tree space; t_shift was rounded.
-Real ExactIntersect::limit(double callers_t) const {
+/// The caller's t in tree space, moved outward by more than roundings take; t_shift was rounded.
+Wide ExactIntersect::in_tree_space(double callers_t, double outward) const {
   const double end = callers_t / prepared_.t_scale.value;
   const double shift = prepared_.t_shift.value;
-  return limit_behind(end - shift + 1e-15 * (magnitude(end) + magnitude(shift)));
+  return end - shift + outward * 1e-15 * (magnitude(end) + magnitude(shift));
 }
 
 }  // namespace zkd::core

@@ -19,7 +19,8 @@ namespace zkd::core {
 /// A hit on one triangle: t = offset / along, a quotient of two determinants.
 class ExactCandidate {
  public:
-  Real limit = 3.4028234663852886e38F;  ///< not less than t in tree space
+  Real limit = 3.4028234663852886e38F;   ///< not less than t in tree space
+  Real begin = -3.4028234663852886e38F;  ///< nor more
   std::uint32_t triangle = no_triangle;
 
   ExactCandidate() = default;
@@ -29,7 +30,8 @@ class ExactCandidate {
 
   [[nodiscard]] bool found() const { return triangle != no_triangle; }
 
-  /// Not less than t, in the caller's units.
+  /// Not more and not less than t, in the caller's units.
+  [[nodiscard]] double at_least() const { return t_.lo; }
   [[nodiscard]] double at_most() const { return t_.hi; }
 
   /// Nearer, or as near and of a lower id.
@@ -54,6 +56,8 @@ class ExactCandidate {
 
 inline Hit to_hit(const ExactCandidate& candidate) { return candidate.hit(); }
 
+inline Real limit_before(const ExactCandidate& candidate) { return candidate.begin; }
+
 class ExactIntersect {
  public:
   using Candidate = ExactCandidate;
@@ -71,7 +75,7 @@ class ExactIntersect {
  private:
   bool decide(const Corners& corners, std::uint32_t id, Candidate& best) const;
   [[nodiscard]] bool crosses(const Corners& corners) const;
-  [[nodiscard]] Real limit(double callers_t) const;
+  [[nodiscard]] Wide in_tree_space(double callers_t, double outward) const;
 
   const PreparedRay& prepared_;
   const Ray& ray_;
