@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
-#include <limits>
 
 #include <zkd/traversal/all_hits.hpp>
 
@@ -64,34 +63,6 @@ std::size_t ray_count(std::size_t rays, std::uint32_t hits_per_ray, std::size_t 
   return rays;
 }
 
-/// Puts the hits of one ray into its places, until they are full.
-class Places {
- public:
-  Places(std::span<Hit> hits, std::size_t ray, std::uint32_t hits_per_ray)
-      : places_(hits.subspan(ray * hits_per_ray, hits_per_ray)) {}
-
-  template <class Candidate>
-  bool operator()(const Candidate& found) {
-    places_[count_++] = core::to_hit(found);
-    return count_ < places_.size();
-  }
-
-  /// Fills the rest with misses. Returns how many hits there are.
-  std::uint32_t finish() {
-    std::fill(places_.begin() + count_, places_.end(), Hit{});
-    return count_;
-  }
-
- private:
-  std::span<Hit> places_;
-  std::uint32_t count_ = 0;
-};
-
-std::uint32_t saturated(std::uint64_t count) {
-  return static_cast<std::uint32_t>(
-      std::min<std::uint64_t>(count, std::numeric_limits<std::uint32_t>::max()));
-}
-
 }  // namespace
 
 namespace detail {
@@ -142,14 +113,10 @@ void closest_hits(const cpu::Executor& executor, const TreeView& tree,
       ray_count(rays.size(), hits_per_ray, hits.size(), counts.size(), costs.size());
   with_intersector(intersector, [&]<class Intersect>() {
     trace_all(cpu::Threads(executor), count, [=]<class Boxes>(std::size_t i) {
-      Places places(hits, i, hits_per_ray);
-      core::AllHitsCost cost;
-      if (hits_per_ray != 0)
-        cost = core::for_each_hit<hits_kept, boxes_in_order, Boxes, Intersect>(tree, triangles,
-                                                                               rays[i], places);
-      const std::uint32_t found = places.finish();
+      const std::uint32_t found = core::closest_hits<hits_kept, boxes_in_order, Boxes, Intersect>(
+          tree, triangles, rays[i], hits.data() + i * hits_per_ray, hits_per_ray,
+          costs.empty() ? nullptr : &costs[i]);
       if (!counts.empty()) counts[i] = found;
-      if (!costs.empty()) costs[i] = {saturated(cost.node_visits), saturated(cost.triangle_tests)};
     });
   });
 }
@@ -161,7 +128,7 @@ void closest_hits_brute_force(const cpu::Executor& executor, const TreeView& tre
   const std::size_t count = ray_count(rays.size(), hits_per_ray, hits.size(), counts.size(), 0);
   with_intersector(intersector, [&]<class Intersect>() {
     for_each_ray(cpu::Threads(executor), count, 1, [=](std::size_t i) {
-      Places places(hits, i, hits_per_ray);
+      core::HitPlaces places(hits.data() + i * hits_per_ray, hits_per_ray);
       if (hits_per_ray != 0)
         core::for_each_hit_brute_force<Intersect>(tree, triangles, rays[i], places);
       const std::uint32_t found = places.finish();

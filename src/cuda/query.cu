@@ -50,6 +50,23 @@ __global__ void __launch_bounds__(block_size)
   if (costs != nullptr) costs[i] = cost;
 }
 
+// `counts` and `costs` may be null.
+template <class Intersect>
+__global__ void __launch_bounds__(block_size)
+    closest_hits_kernel(TreeView tree, TriangleView triangles, const Ray* rays,
+                        std::uint32_t hits_per_ray, Hit* hits, std::uint32_t* counts,
+                        TraversalCost* costs, std::uint32_t count) {
+  const std::uint32_t i = thread_number();
+  if (i >= count) return;
+  TraversalCost cost;
+  const std::uint32_t found =
+      core::closest_hits<core::device_hits_kept, core::device_boxes_in_order, core::FusedBoxTest,
+                         Intersect>(tree, triangles, rays[i], hits + std::size_t{i} * hits_per_ray,
+                                    hits_per_ray, &cost);
+  if (counts != nullptr) counts[i] = found;
+  if (costs != nullptr) costs[i] = cost;
+}
+
 // All threads of a warp look at the same triangle at once.
 template <class Intersect>
 __global__ void __launch_bounds__(block_size)
@@ -89,8 +106,10 @@ std::size_t ray_count(std::span<const Ray> rays, std::size_t answers,
   return costs.empty() ? count : std::min(count, costs.size());
 }
 
-TraversalCost* from(std::span<TraversalCost> costs, std::size_t first) {
-  return costs.empty() ? nullptr : costs.data() + first;
+// What belongs to ray `first` and those behind it; null if nothing was given.
+template <class Value>
+Value* from(std::span<Value> values, std::size_t first) {
+  return values.empty() ? nullptr : values.data() + first;
 }
 
 }  // namespace
@@ -114,6 +133,21 @@ void any_hit(const cuda::Executor& executor, const TreeView& tree, const Triangl
                         triangles, rays.data() + first, occluded.data() + first,
                         from(costs, first));
                 });
+}
+
+void closest_hits(const cuda::Executor& executor, const TreeView& tree,
+                  const TriangleView& triangles, std::span<const Ray> rays,
+                  std::uint32_t hits_per_ray, std::span<Hit> hits, std::span<std::uint32_t> counts,
+                  std::span<TraversalCost> costs, Intersector intersector) {
+  const std::size_t room = hits_per_ray == 0 ? rays.size() : hits.size() / hits_per_ray;
+  const std::size_t total =
+      ray_count(rays, counts.empty() ? room : std::min(room, counts.size()), costs);
+  for_each_part(
+      intersector, total, [=, &executor]<class Intersect>(std::size_t first, std::uint32_t count) {
+        trace("closest_hits", executor.stream, count, closest_hits_kernel<Intersect>, tree,
+              triangles, rays.data() + first, hits_per_ray, hits.data() + first * hits_per_ray,
+              from(counts, first), from(costs, first));
+      });
 }
 
 void closest_hit_brute_force(const cuda::Executor& executor, const TreeView& tree,

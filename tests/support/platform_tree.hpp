@@ -62,6 +62,10 @@ class PlatformTree {
   [[nodiscard]] std::vector<std::uint8_t> any_hits(
       std::span<const Ray> rays, Walk walk = Walk::automatic,
       Intersector intersector = Intersector::watertight) const;
+  /// The first hits of each ray, hits_per_ray places for each.
+  [[nodiscard]] std::vector<Hit> hits_in_order(
+      std::span<const Ray> rays, std::uint32_t hits_per_ray, std::vector<std::uint32_t>& counts,
+      Walk walk = Walk::automatic, Intersector intersector = Intersector::watertight) const;
   [[nodiscard]] std::vector<Hit> brute_force_hits(
       std::span<const Ray> rays, Walk walk = Walk::automatic,
       Intersector intersector = Intersector::watertight) const;

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <zkd/build.hpp>
+#include <zkd/hits.hpp>
 
 #include "support/memory.hpp"
 
@@ -66,6 +67,16 @@ std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk
   std::vector<std::uint8_t> occluded(rays.size(), 7);
   any_hit(executor(walk), there_->tree.view(), there_->triangles, rays, occluded, {}, intersector);
   return occluded;
+}
+
+std::vector<Hit> PlatformTree::hits_in_order(std::span<const Ray> rays, std::uint32_t hits_per_ray,
+                                             std::vector<std::uint32_t>& counts, Walk walk,
+                                             Intersector intersector) const {
+  std::vector<Hit> hits(rays.size() * hits_per_ray);
+  counts.assign(rays.size(), 7);
+  zkd::closest_hits(executor(walk), there_->tree.view(), there_->triangles, rays, hits_per_ray,
+                    hits, counts, {}, intersector);
+  return hits;
 }
 
 std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk walk,

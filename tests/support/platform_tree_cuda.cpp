@@ -67,6 +67,18 @@ std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk
   return occluded.download();
 }
 
+std::vector<Hit> PlatformTree::hits_in_order(std::span<const Ray> rays, std::uint32_t hits_per_ray,
+                                             std::vector<std::uint32_t>& counts, Walk,
+                                             Intersector intersector) const {
+  const Array<Ray> uploaded(rays);
+  Array<Hit> hits(rays.size() * hits_per_ray);
+  Array<std::uint32_t> found(rays.size(), 7);
+  zkd::closest_hits(executor(), there_->tree.view(), there_->tree.triangles(), uploaded,
+                    hits_per_ray, hits, found, {}, intersector);
+  counts = found.download();
+  return hits.download();
+}
+
 std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk,
                                                 Intersector intersector) const {
   const Array<Ray> uploaded(rays);

@@ -103,6 +103,26 @@ std::vector<std::uint8_t> PlatformTree::any_hits(std::span<const Ray> rays, Walk
   return occluded.download();
 }
 
+std::vector<Hit> PlatformTree::hits_in_order(std::span<const Ray> rays, std::uint32_t hits_per_ray,
+                                             std::vector<std::uint32_t>& counts, Walk,
+                                             Intersector intersector) const {
+  const Array<Ray> uploaded(rays);
+  Array<Hit> hits(rays.size() * hits_per_ray);
+  Array<std::uint32_t> found(rays.size(), 7);
+  core::with_intersector(intersector, [&]<class Intersect>() {
+    trace(uploaded,
+          [tree = there_->tree.view(), triangles = there_->tree.triangles(), hits_per_ray,
+           out = std::span<Hit>(hits).data(),
+           count = std::span<std::uint32_t>(found).data()](const Ray& ray, std::size_t i) {
+            count[i] = core::closest_hits<core::device_hits_kept, core::device_boxes_in_order,
+                                          core::FusedBoxTest, Intersect>(
+                tree, triangles, ray, out + i * hits_per_ray, hits_per_ray, nullptr);
+          });
+  });
+  counts = found.download();
+  return hits.download();
+}
+
 std::vector<Hit> PlatformTree::brute_force_hits(std::span<const Ray> rays, Walk,
                                                 Intersector intersector) const {
   const Array<Ray> uploaded(rays);

@@ -36,12 +36,18 @@
 #include <zkd/config.hpp>
 #include <zkd/geometry.hpp>
 #include <zkd/query.hpp>
+#include <zkd/traversal/all_hits.hpp>
 #include <zkd/traversal/intersectors.hpp>
 #include <zkd/traversal/offset.hpp>
 #include <zkd/traversal/traverse.hpp>
 #include <zkd/tree.hpp>
 
 namespace zkd::core {
+
+/// Hits kept and boxes in order, of a ray whose hits are all wanted: see all_hits.hpp. Few, so that
+/// a thread's local memory stays small.
+inline constexpr std::uint32_t device_hits_kept = 8;
+inline constexpr std::uint32_t device_boxes_in_order = 16;
 
 /// BoxTest as a GPU likes it: fused, without a variable index, nodes read 16 bytes at a time.
 /// Rounds once less than core::BoxTest: boxes only say what may be left out, within padding.
@@ -120,6 +126,23 @@ template <Intersector intersector = Intersector::watertight>
                                              const Ray& ray, TraversalCost* cost = nullptr) {
   using Intersect = typename core::Named<intersector>::type;
   return core::trace<true, core::FusedBoxTest, Intersect>(tree, triangles, ray, cost).found();
+}
+
+/// visitor(hit) for every hit of the ray, from near to far, each once. The rules, and the order,
+/// are those of zkd/hits.hpp. The visitor returns whether to go on, as a bool. `cost`, unless null,
+/// is overwritten. Takes 1.2 KB of local memory, 256 bytes of which are for hits that were found
+/// and may still have a nearer one before them; where there are more than 8 of those at once,
+/// another walk finds the furthest again.
+template <Intersector intersector = Intersector::watertight, class Visitor>
+__device__ inline void for_each_hit(const TreeView& tree, const TriangleView& triangles,
+                                    const Ray& ray, Visitor&& visitor,
+                                    TraversalCost* cost = nullptr) {
+  using Intersect = typename core::Named<intersector>::type;
+  auto visit = [&](const core::Candidate& found) -> bool { return visitor(core::to_hit(found)); };
+  const core::AllHitsCost spent =
+      core::for_each_hit<core::device_hits_kept, core::device_boxes_in_order, core::FusedBoxTest,
+                         Intersect>(tree, triangles, ray, visit);
+  if (cost != nullptr) *cost = spent.as_traversal_cost();
 }
 
 /// Where a ray begins that leaves the surface at `hit`: see zkd/query.hpp.

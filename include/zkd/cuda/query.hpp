@@ -36,7 +36,16 @@ ZKD_API void any_hit(const cuda::Executor& executor, const TreeView& tree,
                      std::span<std::uint8_t> occluded, std::span<TraversalCost> costs = {},
                      Intersector intersector = Intersector::watertight);
 
-/// The same answers by a loop over all triangles; see zkd/query.hpp. As above otherwise.
+/// The first `hits_per_ray` hits of each ray, from near to far: see closest_hits of zkd/hits.hpp,
+/// whose places and lengths are the same (`counts` and `costs` may be empty). As above otherwise.
+/// For all hits of a ray, however many, call device::for_each_hit in a kernel of your own.
+ZKD_API void closest_hits(const cuda::Executor& executor, const TreeView& tree,
+                          const TriangleView& triangles, std::span<const Ray> rays,
+                          std::uint32_t hits_per_ray, std::span<Hit> hits,
+                          std::span<std::uint32_t> counts = {}, std::span<TraversalCost> costs = {},
+                          Intersector intersector = Intersector::watertight);
+
+/// The answers of closest_hit by a loop over all triangles; see zkd/query.hpp. As above otherwise.
 ZKD_API void closest_hit_brute_force(const cuda::Executor& executor, const TreeView& tree,
                                      const TriangleView& triangles, std::span<const Ray> rays,
                                      std::span<Hit> hits,

@@ -143,6 +143,13 @@ struct AllHitsCost {
   std::uint64_t node_visits = 0;
   std::uint64_t triangle_tests = 0;
   std::uint64_t walks = 0;
+
+  /// Counts that are too large stay at the largest.
+  [[nodiscard]] ZKD_HOST_DEVICE TraversalCost as_traversal_cost() const {
+    constexpr std::uint64_t most = 0xFFFFFFFFu;
+    return {static_cast<std::uint32_t>(smaller(node_visits, most)),
+            static_cast<std::uint32_t>(smaller(triangle_tests, most))};
+  }
 };
 
 /// One walk from the root. Returns whether to go on after it.
@@ -206,7 +213,44 @@ ZKD_HOST_DEVICE inline AllHitsCost for_each_hit(const TreeView& tree, const Tria
   return cost;
 }
 
-/// The same by a loop over all triangles for each hit.
+/// A visitor that writes the hits of one ray down until their places are full.
+class HitPlaces {
+ public:
+  ZKD_HOST_DEVICE HitPlaces(Hit* places, std::uint32_t most) : places_(places), most_(most) {}
+
+  template <class Candidate>
+  ZKD_HOST_DEVICE bool operator()(const Candidate& found) {
+    places_[count_++] = to_hit(found);
+    return count_ < most_;
+  }
+
+  /// Fills the places that are left with misses. Returns how many hits there are.
+  ZKD_HOST_DEVICE std::uint32_t finish() {
+    for (std::uint32_t i = count_; i < most_; ++i) places_[i] = {};
+    return count_;
+  }
+
+ private:
+  Hit* places_;
+  std::uint32_t most_;
+  std::uint32_t count_ = 0;
+};
+
+/// The first `most` hits of a ray, misses behind them. Returns how many hits. `cost` may be null.
+template <std::uint32_t size, std::uint32_t ordered, class Boxes, class Intersect>
+ZKD_HOST_DEVICE inline std::uint32_t closest_hits(const TreeView& tree,
+                                                  const TriangleView& triangles, const Ray& ray,
+                                                  Hit* hits, std::uint32_t most,
+                                                  TraversalCost* cost) {
+  HitPlaces places(hits, most);
+  AllHitsCost spent;
+  if (most != 0)
+    spent = for_each_hit<size, ordered, Boxes, Intersect>(tree, triangles, ray, places);
+  if (cost != nullptr) *cost = spent.as_traversal_cost();
+  return places.finish();
+}
+
+/// for_each_hit by a loop over all triangles for each hit.
 template <class Intersect, class Visit>
 ZKD_HOST_DEVICE inline void for_each_hit_brute_force(const TreeView& tree,
                                                      const TriangleView& triangles, const Ray& ray,
