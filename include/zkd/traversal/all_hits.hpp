@@ -110,8 +110,9 @@ class FoundHits {
       if (!visit(last_)) return false;
     }
     if (reported == 0) return true;
-    count_ -= reported;
-    for (std::uint32_t i = 0; i < count_; ++i) place(i, hits_[i + reported]);
+    const std::uint32_t end = smaller(count_, size);  // which it is, but compilers do not see it
+    count_ = 0;
+    for (std::uint32_t i = reported; i < end; ++i) place(count_++, hits_[i]);
     return true;
   }
 
