@@ -13,6 +13,7 @@
 #include <zkd/query.hpp>
 
 #include "scene/generate.hpp"
+#include "stress/hits_in_order.hpp"
 #include "stress/intersectors.hpp"
 #include "verify/check.hpp"
 #include "verify/counting_resource.hpp"
@@ -320,6 +321,7 @@ void run_traced(const Case& which, const Setting& setting, Findings& findings) {
   findings.about(which.name);
   if (!rays.empty()) {
     check_brute_force(which, *trees[0], rays, hits, executor, findings);
+    check_hits_in_order(which, trees, rays, hits, executor, findings);
     check_oracle(which, *trees[0], rays, hits, executor, findings);
     check_hits(which, rays, hits, findings);
     check_expense(which, *trees[0], rays, setting, findings);

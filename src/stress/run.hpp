@@ -14,7 +14,8 @@ namespace zkd::stress {
 /// and 3 threads and for permuted triangles; no more memory than memory_requirement said, all of it
 /// given back. Of every ray through every tree: the answer of a loop over all triangles with the
 /// same intersector, bit by bit; any hit exactly when there is a closest hit; nothing missed,
-/// invented or mistaken outside the band, by the exact oracle. The other intersectors are held to
+/// invented or mistaken outside the band, by the exact oracle; the first hits in order those of a
+/// loop, for a sample. The other intersectors are held to
 /// their loops likewise, and `exact` to the oracle without any band. Of large scenes the loops, the
 /// oracle and permutations see a sample.
 void run_case(const Case& which, const Setting& setting, Findings& findings);
