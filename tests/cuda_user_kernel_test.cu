@@ -123,6 +123,53 @@ void expect_same_bounces(const cuda::Tree& tree, const Tree& host, const Triangl
   }
 }
 
+// The last hits of each ray, in order, by a ring of them.
+constexpr std::uint32_t ring_size = 6;
+
+struct Ring {
+  Hit hits[ring_size];
+  std::uint32_t count;
+};
+
+template <Intersector intersector>
+__global__ void __launch_bounds__(block_size)
+    list_hits(TreeView tree, TriangleView triangles, const Ray* rays, Ring* rings,
+              std::uint32_t count) {
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= count) return;
+  rings[i].count = 0;
+  device::for_each_hit<intersector>(tree, triangles, rays[i], [&](const Hit& hit) {
+    rings[i].hits[rings[i].count++ % ring_size] = hit;
+    return true;
+  });
+}
+
+template <Intersector intersector>
+void expect_same_lists(const cuda::Tree& tree, const Tree& host, const TriangleView& triangles,
+                       const std::vector<Ray>& rays) {
+  SCOPED_TRACE(to_string(intersector));
+  const auto count = static_cast<std::uint32_t>(rays.size());
+  const Array<Ray> uploaded = test::upload(rays);
+  Array<Ring> rings(count);
+  list_hits<intersector><<<(count + block_size - 1) / block_size, block_size>>>(
+      tree.view(), tree.triangles(), uploaded.data(), std::span<Ring>(rings).data(), count);
+  test::require(cudaGetLastError());
+  test::require(cudaDeviceSynchronize());
+  const std::vector<Ring> got = rings.download();
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    Ring want = {};
+    for_each_hit(
+        host.view(), triangles, rays[i],
+        [&](const Hit& hit) { want.hits[want.count++ % ring_size] = hit; }, intersector);
+    ASSERT_EQ(got[i].count, want.count) << "ray " << i << " " << print(rays[i]);
+    for (std::uint32_t k = 0; k < ring_size && k < want.count; ++k) {
+      ASSERT_TRUE(same_bits(got[i].hits[k], want.hits[k]))
+          << "ray " << i << " " << print(rays[i]) << ": " << print(got[i].hits[k]) << " instead of "
+          << print(want.hits[k]);
+    }
+  }
+}
+
 class CudaUserKernel : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(CudaUserKernel, GivesTheBitsOfTheHost) {
@@ -144,6 +191,8 @@ TEST_P(CudaUserKernel, GivesTheBitsOfTheHost) {
       expect_same_bounces<Intersector::fast>(tree, host, m.mesh.view(), rays);
       expect_same_bounces<Intersector::single_precision>(tree, host, m.mesh.view(), rays);
       expect_same_bounces<Intersector::double_precision>(tree, host, m.mesh.view(), rays);
+      expect_same_lists<Intersector::watertight>(tree, host, m.mesh.view(), rays);
+      expect_same_lists<Intersector::single_precision>(tree, host, m.mesh.view(), rays);
       if (HasFatalFailure()) return;
     }
   }

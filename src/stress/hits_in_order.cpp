@@ -21,7 +21,7 @@ using verify::same_bits;
 constexpr std::uint32_t places = 24;
 
 // Triangles that all loops of a case test.
-constexpr std::uint64_t most_tests = 10'000'000;
+constexpr std::uint64_t most_tests = 5'000'000;
 
 struct Lists {
   std::vector<Hit> hits;

@@ -24,6 +24,15 @@ extern "C" __global__ void two_bounces(zkd::TreeView tree, zkd::TriangleView tri
   occluded[i] = zkd::device::any_hit(tree, triangles, shadow) ? 1 : 0;
 }
 
+extern "C" __global__ void count_hits(zkd::TreeView tree, zkd::TriangleView triangles,
+                                      const zkd::Ray* rays, std::uint32_t* counts, float* last) {
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  zkd::device::for_each_hit(tree, triangles, rays[i], [&](const zkd::Hit& hit) {
+    last[i] = hit.t;
+    return ++counts[i] < 100;
+  });
+}
+
 template <zkd::Intersector intersector>
 __global__ void trace_with(zkd::TreeView tree, zkd::TriangleView triangles, zkd::Ray* rays,
                            zkd::Hit* hits) {
