@@ -82,6 +82,10 @@ void print(const char* name, float (*coordinate)(int), zkd::References reference
     } else {
       std::printf("%s %d: miss %d\n", name, i, any);
     }
+    zkd::for_each_hit(tree.view(), triangles, ray, [](const zkd::Hit& each) {
+      std::printf("%u %08x ", each.triangle, std::bit_cast<std::uint32_t>(each.t));
+    });
+    std::printf("\n");
   }
 }
 
