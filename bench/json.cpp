@@ -9,6 +9,7 @@
 #include <zkd/config.hpp>
 
 #include "skips.hpp"
+#include "tree_stats.hpp"
 
 namespace zkd::bench {
 namespace {
@@ -163,6 +164,7 @@ Json json_of(const Result& result) {
       {"crowded_trunks", statistics.crowded_trunks},
       {"crowded_triangles", statistics.crowded_triangles},
       {"hash", result.tree_hash}};
+  if (result.tree_statistics) json["tree"]["statistics"] = tree_stats_json(*result.tree_statistics);
   json["trace"] = json_of(result.traces);
   if (result.gpu) json["gpu"] = json_of(*result.gpu);
 

@@ -178,6 +178,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   app.add_option("--images", images, "Write PNG: shaded, depth, node visits")
       ->group(report)
       ->type_name("DIR");
+  app.add_flag("--stats", options.stats, "Counts and histograms of the trees")->group(report);
   app.footer(exit_status_help);
   if (!parse(app, argc, argv)) return std::nullopt;
 

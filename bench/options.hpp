@@ -47,6 +47,7 @@ struct Options {
 
   std::optional<std::filesystem::path> json;  ///< "-": standard output, and no table
   std::optional<std::filesystem::path> images;
+  bool stats = false;  ///< counts and histograms of the trees
   bool list = false;
 };
 

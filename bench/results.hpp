@@ -13,6 +13,7 @@
 
 #include <zkd/options.hpp>
 #include <zkd/statistics.hpp>
+#include <zkd/tree_statistics.hpp>
 
 #include "verify/check.hpp"
 
@@ -123,6 +124,7 @@ struct Result {
   AllocatedBytes allocated;
   Statistics statistics;     ///< counts of the timed builds
   bool has_quality = false;  ///< depth and SAH cost in `statistics` were measured
+  std::optional<TreeStatistics> tree_statistics;  ///< with --stats
   std::string tree_hash;
   Traces traces;
   std::optional<Gpu> gpu;           ///< CUDA only

@@ -16,6 +16,7 @@
 
 #include <zkd/build.hpp>
 #include <zkd/query.hpp>
+#include <zkd/tree_statistics.hpp>
 
 #include "check.hpp"
 #include "cold_start.hpp"
@@ -193,6 +194,7 @@ Result describe(const scene::SceneInfo& info, const scene::Mesh& mesh, const Opt
   tree = zkd::build(executor, mesh.view(), build);
   result.has_quality = options.measure_quality;
   result.statistics = tree.statistics();
+  if (options.stats) result.tree_statistics = measure_tree(tree.view());
   result.tree_hash = verify::tree_hash(tree.view());
   return result;
 }

@@ -13,6 +13,7 @@
 #include <zkd/config.hpp>
 
 #include "skips.hpp"
+#include "tree_stats.hpp"
 
 namespace zkd::bench {
 namespace {
@@ -415,6 +416,7 @@ void print_results(std::ostream& out, const Options& options, const std::vector<
   print_spread(out, results);
   print_stages(out, results);
   print_skips(out, results);
+  print_tree_stats(out, results);
   if (!options.peers.empty()) print_peers(out, results);
   if (options.check > 0) print_check(out, results);
   if (options.images) print_images(out, options, results);

@@ -47,12 +47,12 @@ TEST_F(BenchCli, HelpVersionAndListSucceed) {
   const Outcome help = run("--help");
   EXPECT_EQ(help.status, 0);
   for (const char* option :
-       {"--backend",    "--threads",      "--references", "--budget",     "--builder",
-        "--quality",    "--leaf-size",    "--code-bits",  "--axis-order", "--recode",
-        "--invalid",    "--instructions", "--rays",       "--size",       "--repeat",
-        "--peers",      "--check",        "--json",       "--images",     "--list",
-        "--version",    "--seed",         "--cold",       "--time-limit", "--reference-capacity",
-        "--intersector"}) {
+       {"--backend",     "--threads",      "--references", "--budget",     "--builder",
+        "--quality",     "--leaf-size",    "--code-bits",  "--axis-order", "--recode",
+        "--invalid",     "--instructions", "--rays",       "--size",       "--repeat",
+        "--peers",       "--check",        "--json",       "--images",     "--list",
+        "--version",     "--seed",         "--cold",       "--time-limit", "--reference-capacity",
+        "--intersector", "--stats"}) {
     EXPECT_NE(help.out.find(option), std::string::npos) << option;
   }
   const Outcome version = run("--version");
@@ -298,6 +298,19 @@ TEST_F(BenchCli, AnswersAreJudgedByTheBandOfTheirIntersector) {
       EXPECT_EQ(check["in_band"]["wrong_triangle"], 0);
     }
   }
+}
+
+TEST_F(BenchCli, StatsAreShownOnRequest) {
+  const Outcome shown = run("tetra.obj --stats" + std::string(quick));
+  EXPECT_NE(shown.out.find("Tree of tetra"), std::string::npos);
+  EXPECT_NE(shown.out.find("triangles in a leaf"), std::string::npos);
+  const Json tree = run_json("tetra.obj --stats" + std::string(quick))["results"][0]["tree"];
+  expect_keys(tree["statistics"], {"nodes", "leaves", "empty_leaves", "references", "mean_depth",
+                                   "expected_node_visits", "leaves_at_depth", "leaves_of_size"});
+  EXPECT_EQ(tree["statistics"]["leaves"], tree["leaves"]);
+  EXPECT_EQ(tree["statistics"]["sah_cost"], tree["sah"]);
+  EXPECT_FALSE(
+      run_json("tetra.obj" + std::string(quick))["results"][0]["tree"].contains("statistics"));
 }
 
 TEST_F(BenchCli, SameTreeAndSameRaysOnAnyNumberOfThreads) {
