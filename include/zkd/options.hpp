@@ -27,7 +27,7 @@ enum class References {
 /// Which algorithm decides the planes.
 enum class Builder {
   morton,  ///< all nodes at once from Morton codes (Li, Wang, Deng, I3D 2014)
-  sah,     ///< exact surface-area heuristic (not in this version)
+  sah,     ///< exact surface-area heuristic (Wald, Havran 2006; see SahOptions). CPU only
   wu2011,  ///< Wu, Zhao, Liu 2011 (not in this version)
 };
 
@@ -45,17 +45,52 @@ enum class InvalidTriangles {
   skip,   ///< left out of the tree and counted; ids of the others are kept
 };
 
+/// Which boxes the surface-area heuristic takes the areas of.
+enum class SahAreas {
+  tight,  ///< what a walk here tests: the tight boxes of both children
+  cells,  ///< of Wald and Havran: the halves of the cell, whatever is in them
+};
+
 /// In which order the bits of the axes enter the Morton code.
 enum class AxisOrder {
   by_extent,  ///< the longest remaining side first: squarer cells
   cyclic,     ///< x, y, z in turn, as in the poster
 };
 
+/// What Builder::sah weighs: a split costs `visit_cost` and the expected triangle tests on its two
+/// sides, a leaf its triangle tests (MacDonald and Booth 1990), and the cheapest is taken.
+struct SahOptions {
+  /// Of a ray that visits an inner node, in any unit; 1/1024 to 1024. With both costs 1 the builder
+  /// minimises what Statistics::sah_cost measures.
+  float visit_cost = 1.0F;
+
+  /// Of a triangle test, in the same unit; 1/1024 to 1024.
+  float test_cost = 1.0F;
+
+  /// `tight`: a ray enters a child by its tight box, so that this is what its cost depends on. The
+  /// box of a side is that of its triangles, cut at the plane; what more a cut takes off a triangle
+  /// is only known once the split is chosen.
+  SahAreas areas = SahAreas::tight;
+
+  /// For `cells`: by how much of itself a split is cheaper that cuts off an empty cell; at least 0,
+  /// below 1 (Wald and Havran take 0.2). 0, since a tight box has no empty space to cut off, and
+  /// `tight` counts what lies between the boxes of both sides.
+  float empty_bonus = 0.0F;
+};
+
 /// Options of build(). A value outside its range is ErrorCode::invalid_option.
 struct BuildOptions {
   Backend backend = Backend::automatic;  ///< ignored where an executor is given
 
+  /// `sah` makes the best trees and takes some fifty times as long: for scenes that stay as they
+  /// are, and as the measure of other trees. It lists a triangle in every cell that it enters,
+  /// whatever `references` says (Tree::options() then says `all`), ends where no split is cheaper
+  /// (`leaf_size` is not looked at), and has no use for codes: `code_bits`, `axis_order`,
+  /// `recode_crowded` and `reference_capacity` are not looked at either. In a device build it is
+  /// ErrorCode::unsupported_option; without an executor, Backend::automatic takes the CPU for it.
   Builder builder = Builder::morton;
+  SahOptions sah;  ///< for Builder::sah
+
   Quality quality = Quality::fast;
 
   /// `once` takes about a tenth of the time to build that `all` takes and two thirds of the memory
@@ -106,5 +141,6 @@ ZKD_API const char* to_string(Builder value) noexcept;
 ZKD_API const char* to_string(Quality value) noexcept;
 ZKD_API const char* to_string(InvalidTriangles value) noexcept;
 ZKD_API const char* to_string(AxisOrder value) noexcept;
+ZKD_API const char* to_string(SahAreas value) noexcept;
 
 }  // namespace zkd

@@ -23,6 +23,55 @@ void check(Enum value, Enum last, const char* option) {
   check_enumerator(static_cast<std::int64_t>(value), static_cast<std::int64_t>(last), option);
 }
 
+void check_cost(float cost, const char* name) {
+  if (!(cost >= 1.0F / 1024.0F && cost <= 1024.0F))
+    fail(ErrorCode::invalid_option, 0,
+         std::string(name) + " is " + std::to_string(cost) + "; it must be 1/1024 to 1024");
+}
+
+void check_ranges(const SahOptions& options) {
+  check_cost(options.visit_cost, "sah.visit_cost");
+  check_cost(options.test_cost, "sah.test_cost");
+  check(options.areas, SahAreas::cells, "sah.areas");
+  if (!(options.empty_bonus >= 0.0F && options.empty_bonus < 1.0F))
+    fail(ErrorCode::invalid_option, 0,
+         "sah.empty_bonus is " + std::to_string(options.empty_bonus) +
+             "; it must be at least 0 and below 1");
+}
+
+void check_ranges(const BuildOptions& options) {
+  check(options.builder, Builder::wu2011, "builder");
+  check(options.quality, Quality::high, "quality");
+  check(options.references, References::automatic, "references");
+  check(options.invalid_triangles, InvalidTriangles::skip, "invalid_triangles");
+  check(options.axis_order, AxisOrder::cyclic, "axis_order");
+  check(options.backend, Backend::cuda, "backend");
+  if (options.leaf_size < 1 || options.leaf_size > 1024)
+    fail(ErrorCode::invalid_option, options.leaf_size,
+         "leaf_size is " + std::to_string(options.leaf_size) + "; it must be 1 to 1024");
+  if (options.code_bits > 64)
+    fail(ErrorCode::invalid_option, options.code_bits,
+         "code_bits is " + std::to_string(options.code_bits) +
+             "; it must be 1 to 64, or 0 for automatic");
+  if (!std::isfinite(options.budget) || options.budget < 1.0F)
+    fail(ErrorCode::invalid_option, 0,
+         "budget is " + std::to_string(options.budget) + "; it must be finite and at least 1");
+  if (options.reference_capacity > max_count)
+    fail(ErrorCode::invalid_option, options.reference_capacity,
+         "reference_capacity is " + std::to_string(options.reference_capacity) +
+             "; a tree holds at most " + std::to_string(max_count));
+  check_ranges(options.sah);
+}
+
+/// What this version does not have.
+void check_supported(const BuildOptions& options) {
+  if (options.builder == Builder::wu2011) unsupported("builder", to_string(options.builder));
+  if (options.quality != Quality::fast) unsupported("quality", to_string(options.quality));
+  if (options.builder == Builder::morton &&
+      (options.references == References::budget || options.references == References::automatic))
+    unsupported("references", to_string(options.references));
+}
+
 }  // namespace
 
 void check_enumerator(std::int64_t value, std::int64_t last, const char* option) {
@@ -65,30 +114,15 @@ void check_view(const TriangleView& triangles) {
 }
 
 void check_options(const BuildOptions& options) {
-  check(options.builder, Builder::wu2011, "builder");
-  check(options.quality, Quality::high, "quality");
-  check(options.references, References::automatic, "references");
-  check(options.invalid_triangles, InvalidTriangles::skip, "invalid_triangles");
-  check(options.axis_order, AxisOrder::cyclic, "axis_order");
-  check(options.backend, Backend::cuda, "backend");
-  if (options.leaf_size < 1 || options.leaf_size > 1024)
-    fail(ErrorCode::invalid_option, options.leaf_size,
-         "leaf_size is " + std::to_string(options.leaf_size) + "; it must be 1 to 1024");
-  if (options.code_bits > 64)
-    fail(ErrorCode::invalid_option, options.code_bits,
-         "code_bits is " + std::to_string(options.code_bits) +
-             "; it must be 1 to 64, or 0 for automatic");
-  if (!std::isfinite(options.budget) || options.budget < 1.0F)
-    fail(ErrorCode::invalid_option, 0,
-         "budget is " + std::to_string(options.budget) + "; it must be finite and at least 1");
-  if (options.reference_capacity > max_count)
-    fail(ErrorCode::invalid_option, options.reference_capacity,
-         "reference_capacity is " + std::to_string(options.reference_capacity) +
-             "; a tree holds at most " + std::to_string(max_count));
-  if (options.builder != Builder::morton) unsupported("builder", to_string(options.builder));
-  if (options.quality != Quality::fast) unsupported("quality", to_string(options.quality));
-  if (options.references == References::budget || options.references == References::automatic)
-    unsupported("references", to_string(options.references));
+  check_ranges(options);
+  if (options.builder == Builder::sah)
+    fail(ErrorCode::unsupported_option, 0, "builder sah is only there for builds on the CPU");
+  check_supported(options);
+}
+
+void check_cpu_options(const BuildOptions& options) {
+  check_ranges(options);
+  check_supported(options);
 }
 
 }  // namespace zkd::core

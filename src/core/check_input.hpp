@@ -17,8 +17,11 @@ ZKD_API void check_view(const TriangleView& triangles);
 /// Throws Error too_many_triangles.
 ZKD_API void check_count(std::uint64_t triangle_count);
 
-/// Throws Error invalid_option or unsupported_option.
+/// For the Morton builder. Throws Error invalid_option or unsupported_option.
 ZKD_API void check_options(const BuildOptions& options);
+
+/// For every builder that the CPU has. Throws likewise.
+void check_cpu_options(const BuildOptions& options);
 
 /// Throws Error invalid_option where `value` is no enumerator of an enumeration that ends in
 /// `last`.

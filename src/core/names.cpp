@@ -38,6 +38,9 @@ const char* to_string(InvalidTriangles value) noexcept {
 const char* to_string(AxisOrder value) noexcept {
   return name_of(std::array{"extent", "cyclic"}, value);
 }
+const char* to_string(SahAreas value) noexcept {
+  return name_of(std::array{"tight", "cells"}, value);
+}
 const char* to_string(Intersector value) noexcept {
   return name_of(std::array{"watertight", "fast", "single", "double", "exact"}, value);
 }

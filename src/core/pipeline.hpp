@@ -87,7 +87,22 @@ struct Workspace {
   }
 };
 
-/// Lattice, coder and frame from what validation found; or the end of the build.
+/// Counts and frame from what validation found; or the end of the build.
+ZKD_HOST_DEVICE inline void admit_scene(BuildState& state, const TriangleView& triangles,
+                                        InvalidTriangles invalid) {
+  const auto given = static_cast<std::uint32_t>(triangles.triangle_count);
+  const std::uint32_t valid = state.report.valid;
+  state.counts = {};
+  state.counts.given = given;
+  state.counts.listed = valid;
+  state.counts.left_out = given - valid;
+  judge(state.report, triangles, invalid, state.counts);
+  if (state.counts.status.failed != 0) state.report.bounds = Box{};
+  state.root = Link{};
+  state.frame = SceneFrame(state.report.bounds);
+}
+
+/// The same with lattice and coder.
 struct PrepareScene {
   BuildState* state;
   TriangleView triangles;
@@ -96,19 +111,10 @@ struct PrepareScene {
   InvalidTriangles invalid;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    const auto given = static_cast<std::uint32_t>(triangles.triangle_count);
-    const std::uint32_t valid = state->report.valid;
-    state->counts = {};
-    state->counts.given = given;
-    state->counts.listed = valid;
-    state->counts.left_out = given - valid;
-    judge(state->report, triangles, invalid, state->counts);
-    if (state->counts.status.failed != 0) state->report.bounds = Box{};
-    state->root = Link{};
-    state->frame = SceneFrame(state->report.bounds);
-    state->lattice =
-        make_lattice(widen(state->report.bounds), choose_code_bits(code_bits_asked, valid), order,
-                     state->frame.finest);
+    admit_scene(*state, triangles, invalid);
+    state->lattice = make_lattice(widen(state->report.bounds),
+                                  choose_code_bits(code_bits_asked, state->report.valid), order,
+                                  state->frame.finest);
     state->coder = MortonCoder(state->lattice);
   }
 };

@@ -13,6 +13,7 @@
 #include "core/pipeline.hpp"
 #include "core/quality.hpp"
 #include "cpu/backend.hpp"
+#include "cpu/sah/build.hpp"
 
 namespace zkd {
 namespace {
@@ -34,18 +35,24 @@ Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const Buil
                                  statistics, backend.tree_block(), backend.reference_block());
 }
 
+Tree build_morton(const cpu::Executor& executor, const TriangleView& triangles,
+                  const BuildOptions& options) {
+  cpu::Backend backend(executor);
+  return core::needs_wide_codes(options, triangles.triangle_count)
+             ? build_with<std::uint64_t>(backend, triangles, options)
+             : build_with<std::uint32_t>(backend, triangles, options);
+}
+
 }  // namespace
 
 Tree build(const cpu::Executor& executor, const TriangleView& triangles,
            const BuildOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  core::check_options(options);
+  core::check_cpu_options(options);
   core::check_view(triangles);
   cpu::check_executor(executor);
-  cpu::Backend backend(executor);
-  Tree tree = core::needs_wide_codes(options, triangles.triangle_count)
-                  ? build_with<std::uint64_t>(backend, triangles, options)
-                  : build_with<std::uint32_t>(backend, triangles, options);
+  Tree tree = options.builder == Builder::sah ? cpu::sah::build(executor, triangles, options)
+                                              : build_morton(executor, triangles, options);
   Statistics& statistics = TreeAssembler::statistics(tree);
   statistics.total_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -53,8 +60,12 @@ Tree build(const cpu::Executor& executor, const TriangleView& triangles,
 }
 
 Tree build(const TriangleView& triangles, const BuildOptions& options) {
-  core::check_options(options);
-  if (options.backend != Backend::cpu) {
+  const bool only_on_cpu = options.builder == Builder::sah && options.backend != Backend::cuda;
+  if (only_on_cpu)
+    core::check_cpu_options(options);
+  else
+    core::check_options(options);
+  if (options.backend != Backend::cpu && !only_on_cpu) {
     std::string why = "this program does not link zkd::cuda";
     if (zkd_cuda_entry != nullptr && zkd_cuda_entry()->available(&why))
       return zkd_cuda_entry()->build(triangles, options);
