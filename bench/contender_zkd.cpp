@@ -42,7 +42,7 @@ class CpuContender final : public ZkdContender {
   void clear() override { tree_ = Tree(); }
 
   // Bytes, in a build whose memory is counted. `once` can be asked for beforehand; for `all` the
-  // question is put with the number of references that it turned out to have.
+  // question is put with the number of references that it turned out to have; `sah` cannot tell.
   void describe(Result& result) override {
     CountingResource memory;
     cpu::Executor counted = executor_;
@@ -50,11 +50,13 @@ class CpuContender final : public ZkdContender {
     const Tree tree = zkd::build(counted, triangles_, options_);
     result.allocated.tree = memory.held();
     result.allocated.workspace = memory.peak() - memory.held();
-    const std::uint64_t references =
-        options_.references == References::once ? 0 : tree.view().reference_count();
-    const MemoryRequirement asked =
-        memory_requirement(counted, triangles_.triangle_count, options_, references);
-    result.allocated.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;
+    if (options_.builder == Builder::morton) {
+      const std::uint64_t references =
+          options_.references == References::once ? 0 : tree.view().reference_count();
+      const MemoryRequirement asked =
+          memory_requirement(counted, triangles_.triangle_count, options_, references);
+      result.allocated.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;
+    }
     result.options = tree.options();
     result.options.backend = Backend::cpu;  // an executor was given, so the option stays as asked
   }

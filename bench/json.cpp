@@ -87,6 +87,10 @@ Json json_of_options(const Result& result) {
           {"recode", options.recode_crowded},
           {"invalid", zkd::to_string(options.invalid_triangles)},
           {"reference_capacity", options.reference_capacity},
+          {"sah_areas", zkd::to_string(options.sah.areas)},
+          {"sah_visit_cost", shortest(options.sah.visit_cost)},
+          {"sah_test_cost", shortest(options.sah.test_cost)},
+          {"sah_empty_bonus", shortest(options.sah.empty_bonus)},
           {"instructions", result.instructions},
           {"intersector", result.intersector},
           {"seed", result.seed}};

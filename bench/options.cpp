@@ -24,6 +24,7 @@ constexpr std::array all_references{References::once, References::budget, Refere
 constexpr std::array all_builders{Builder::morton, Builder::sah, Builder::wu2011};
 constexpr std::array all_qualities{Quality::fast, Quality::balanced, Quality::high};
 constexpr std::array all_axis_orders{AxisOrder::by_extent, AxisOrder::cyclic};
+constexpr std::array all_sah_areas{SahAreas::tight, SahAreas::cells};
 constexpr std::array all_invalid{InvalidTriangles::error, InvalidTriangles::skip};
 constexpr std::array all_ray_kinds{RayKind::primary, RayKind::diffuse, RayKind::shadow};
 constexpr std::array all_instructions{cpu::InstructionSet::automatic, cpu::InstructionSet::portable,
@@ -76,7 +77,15 @@ std::vector<std::string> flags_of(const BuildOptions& options) {
           "--invalid",
           zkd::to_string(options.invalid_triangles),
           "--reference-capacity",
-          std::to_string(options.reference_capacity)};
+          std::to_string(options.reference_capacity),
+          "--sah-areas",
+          zkd::to_string(options.sah.areas),
+          "--sah-visit-cost",
+          std::to_string(options.sah.visit_cost),
+          "--sah-test-cost",
+          std::to_string(options.sah.test_cost),
+          "--sah-empty-bonus",
+          std::to_string(options.sah.empty_bonus)};
 }
 
 std::optional<Options> parse_options(int argc, const char* const* argv) {
@@ -89,6 +98,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   std::string references = zkd::to_string(defaults.references);
   std::string axis_order = zkd::to_string(defaults.axis_order);
   std::string invalid = zkd::to_string(defaults.invalid_triangles);
+  std::string sah_areas = zkd::to_string(defaults.sah.areas);
   std::string recode = on_off(defaults.recode_crowded);
   std::string measure_quality = "on";
   std::string instructions = to_string(options.instructions);
@@ -96,6 +106,9 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   std::string rays = names_of(all_ray_kinds, ",");
   std::string peers;
   double budget = static_cast<double>(defaults.budget);
+  double visit_cost = static_cast<double>(defaults.sah.visit_cost);
+  double test_cost = static_cast<double>(defaults.sah.test_cost);
+  double empty_bonus = static_cast<double>(defaults.sah.empty_bonus);
   std::int64_t threads = 0;
   std::int64_t leaf_size = defaults.leaf_size;
   std::int64_t code_bits = defaults.code_bits;
@@ -134,10 +147,10 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   text(build, "--builder", builder, "List of " + names_of(all_builders, ", "), "LIST");
   text(build, "--quality", quality, "List of " + names_of(all_qualities, ", "), "LIST");
   text(build, "--references", references, "List of " + names_of(all_references, ", "), "LIST");
-  app.add_option("--budget", budget, "References per triangle at most, for `budget`")
-      ->group(build)
-      ->type_name("F")
-      ->capture_default_str();
+  const auto fraction = [&](const char* name, double& value, const char* help) {
+    app.add_option(name, value, help)->group(build)->type_name("F")->capture_default_str();
+  };
+  fraction("--budget", budget, "References per triangle at most, for `budget`");
   number(build, "--leaf-size", leaf_size, "Triangles in a leaf at most", 1, 1024);
   number(build, "--code-bits", code_bits, "Bits of a Morton code; 0: by triangle count", 0, 64);
   text(build, "--axis-order", axis_order,
@@ -148,6 +161,11 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   number(build, "--reference-capacity", reference_capacity,
          "On CUDA, references that `all` has room for; 0: as many as it needs", 0,
          std::int64_t{max_count});
+  text(build, "--sah-areas", sah_areas, "For sah, areas of: " + names_of(all_sah_areas, ", "),
+       "WHAT");
+  fraction("--sah-visit-cost", visit_cost, "For sah, the cost of a node visit");
+  fraction("--sah-test-cost", test_cost, "For sah, the cost of a triangle test");
+  fraction("--sah-empty-bonus", empty_bonus, "For sah over cells, what cutting off space saves");
   text(build, "--measure-quality", measure_quality,
        "Depth and SAH cost, in a build of its own: on, off", "ON|OFF");
   text(build, "--instructions", instructions, names_of(all_instructions, ", "), "SET");
@@ -197,6 +215,10 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   base.axis_order = value_named(all_axis_orders, "--axis-order", axis_order);
   base.reference_capacity = static_cast<std::uint64_t>(reference_capacity);
   base.recode_crowded = on_or_off("--recode", recode);
+  base.sah.areas = value_named(all_sah_areas, "--sah-areas", sah_areas);
+  base.sah.visit_cost = static_cast<float>(visit_cost);
+  base.sah.test_cost = static_cast<float>(test_cost);
+  base.sah.empty_bonus = static_cast<float>(empty_bonus);
   base.invalid_triangles = value_named(all_invalid, "--invalid", invalid);
 
   const auto builders = values_listed(all_builders, "--builder", builder);
@@ -205,6 +227,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   for (const Builder one_builder : builders) {
     for (const Quality one_quality : qualities) {
       for (const References one_policy : policies) {
+        // sah knows one policy only.
+        if (one_builder == Builder::sah && one_policy != policies.front()) continue;
         BuildOptions setting = base;
         setting.builder = one_builder;
         setting.quality = one_quality;

@@ -52,9 +52,10 @@ using Traces = std::map<RayKind, Trace>;
 
 /// Bytes that a build took from its memory resource.
 struct AllocatedBytes {
-  std::uint64_t tree = 0;              ///< still held when build returned
-  std::uint64_t workspace = 0;         ///< most that was held besides
-  std::uint64_t asked_beforehand = 0;  ///< zkd::memory_requirement, tree and workspace together
+  std::uint64_t tree = 0;       ///< still held when build returned
+  std::uint64_t workspace = 0;  ///< most that was held besides
+  /// zkd::memory_requirement, tree and workspace together; 0 where it cannot tell.
+  std::uint64_t asked_beforehand = 0;
 };
 
 /// Answers that differ from the exact oracle.

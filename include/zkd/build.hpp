@@ -14,8 +14,8 @@
 
 namespace zkd {
 
-/// Builds a kd-tree over `triangles` (Li, Wang, Deng: Fully Parallel Kd-Tree Construction for
-/// Real-Time Ray Tracing, I3D 2014).
+/// Builds a kd-tree over `triangles`: by default that of Li, Wang, Deng (Fully Parallel Kd-Tree
+/// Construction for Real-Time Ray Tracing, I3D 2014); see BuildOptions::builder.
 ///
 /// options.backend says where: `automatic` takes CUDA if the program links zkd::cuda and a device
 /// answers, else the CPU, and Tree::options().backend says which it was. Either way triangles are
@@ -27,7 +27,10 @@ namespace zkd {
 /// empty tree.
 ///
 /// Work for n triangles: with `once` O(n * leaf_size), plus O(log n) a leaf (the sort has a fixed
-/// number of digits); with `all` O((n + references) * depth).
+/// number of digits); with `all` O((n + references) * depth). Builder::sah (Wald, Havran: On building
+/// fast kd-Trees for Ray Tracing, and on doing that in O(N log N), RT 2006): O(n log n) as long as few
+/// triangles lie across each plane, else O((n + references) * depth). Its memory is not bounded
+/// beforehand; it takes at most 2^30 - 1 valid triangles (too_many_triangles).
 ///
 /// Throws Error: index_out_of_range, non_finite_vertex, too_many_triangles, too_many_references,
 /// invalid_view, invalid_option, unsupported_option, backend_unavailable, out_of_memory; and on
@@ -48,9 +51,10 @@ struct MemoryRequirement {
 /// What build() allocates at most from its memory resource for `triangle_count` triangles, whatever
 /// the scene: a resource that holds tree_bytes + workspace_bytes is never exhausted. Scenes without
 /// crowded trunks take less. For References::all the number of references is not known beforehand:
-/// pass a bound (or a guess) in `reference_count`. O(1).
+/// pass a bound (or a guess) in `reference_count`. For Builder::sah nothing is known beforehand.
+/// O(1).
 ///
-/// Throws Error invalid_option, unsupported_option, too_many_triangles.
+/// Throws Error invalid_option, unsupported_option (Builder::sah too), too_many_triangles.
 [[nodiscard]] ZKD_API MemoryRequirement memory_requirement(const cpu::Executor& executor,
                                                            std::uint64_t triangle_count,
                                                            const BuildOptions& options = {},

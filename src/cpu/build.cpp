@@ -78,7 +78,10 @@ Tree build(const TriangleView& triangles, const BuildOptions& options) {
 MemoryRequirement memory_requirement(const cpu::Executor& executor, std::uint64_t triangle_count,
                                      const BuildOptions& options, std::uint64_t reference_count) {
   cpu::check_executor(executor);
-  core::check_options(options);
+  core::check_cpu_options(options);
+  if (options.builder == Builder::sah)
+    throw Error(ErrorCode::unsupported_option, 0,
+                "what builder sah takes is not known beforehand: memory_requirement is for others");
   core::check_count(triangle_count);
   return cpu::Backend::requirement(
       executor, triangle_count, options, core::needs_wide_codes(options, triangle_count),

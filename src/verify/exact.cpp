@@ -48,8 +48,8 @@ int turned_sign(const Point& p, const Point& q, const Point& a, const Point& b, 
   return sgn(exact);
 }
 
-// Whether the plane of the triangle has the whole box strictly on one side.
-bool separated_by_plane(const Corners& corners, const ExactBox& box) {
+// Whether the plane of the triangle has the whole box on one side, strictly or (`touching`) not.
+bool separated_by_plane(const Corners& corners, const ExactBox& box, bool touching) {
   const Point& a = corners[0];
   int side = 0;
   for (unsigned which = 0; which < 8; ++which) {
@@ -68,35 +68,36 @@ bool separated_by_plane(const Corners& corners, const ExactBox& box) {
                                    IntegerPoint(corners[2], exponent) - origin);
       sign = sgn(dot(IntegerPoint(at, exponent) - origin, n));
     }
+    if (sign == 0 && touching) continue;
     if (sign == 0 || (side != 0 && sign != side)) return false;
     side = sign;
   }
   return true;
 }
 
-// Whether some axis perpendicular to edge (a, b) and to one box axis separates strictly.
+// Whether the axis perpendicular to edge (a, b) and to box axis k separates, strictly or
+// (`touching`) not.
 bool separated_across_edge(const Corners& corners, const ExactBox& box, const Point& a,
-                           const Point& b) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t j = (i + 1) % 3;
-    const std::size_t k = (i + 2) % 3;
-    // Along w with w_i = (b - a)_j and w_j = -(b - a)_i, the corner of the box that is farthest:
-    Point high = box.lo;
-    Point low = box.lo;
-    (b[j] > a[j] ? high : low)[i] = box.hi[i];
-    (b[i] < a[i] ? high : low)[j] = box.hi[j];
-    // The third axis does not enter; any value does, one of a keeps the common exponent small.
-    high[k] = low[k] = a[k];
-    bool above = true;
-    bool below = true;
-    for (const Point& p : corners) {
-      above = above && turned_sign(p, high, a, b, i, j) > 0;
-      below = below && turned_sign(p, low, a, b, i, j) < 0;
-      if (!above && !below) break;
-    }
-    if (above || below) return true;
+                           const Point& b, std::size_t k, bool touching) {
+  const std::size_t i = (k + 1) % 3;
+  const std::size_t j = (k + 2) % 3;
+  if (a[i] == b[i] && a[j] == b[j]) return false;
+  // Along w with w_i = (b - a)_j and w_j = -(b - a)_i, the corner of the box that is farthest:
+  Point high = box.lo;
+  Point low = box.lo;
+  (b[j] > a[j] ? high : low)[i] = box.hi[i];
+  (b[i] < a[i] ? high : low)[j] = box.hi[j];
+  // The third axis does not enter; any value does, one of a keeps the common exponent small.
+  high[k] = low[k] = a[k];
+  const int least = touching ? 0 : 1;
+  bool above = true;
+  bool below = true;
+  for (const Point& p : corners) {
+    above = above && turned_sign(p, high, a, b, i, j) >= least;
+    below = below && turned_sign(p, low, a, b, i, j) <= -least;
+    if (!above && !below) return false;
   }
-  return false;
+  return true;
 }
 
 }  // namespace
@@ -141,9 +142,42 @@ bool exact_overlap(const Corners& corners, const ExactBox& box) {
     const auto [lo, hi] = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
     if (lo > box.hi[axis] || hi < box.lo[axis]) return false;
   }
-  if (separated_by_plane(corners, box)) return false;
+  if (separated_by_plane(corners, box, false)) return false;
   for (std::size_t i = 0; i < 3; ++i) {
-    if (separated_across_edge(corners, box, corners[i], corners[(i + 1) % 3])) return false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (separated_across_edge(corners, box, corners[i], corners[(i + 1) % 3], axis, false)) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+// Separating axes again. A triangle that lies in no side shares an area with a box exactly if it
+// reaches the inside, an open set: what separates the two may touch both. A triangle across an axis
+// is taken to the plane of the others, where the same holds of triangle and rectangle.
+bool exact_shares_area(const Corners& corners, const ExactBox& box) {
+  if (empty(box)) return false;
+  bool across[3];  // all corners have the same coordinate
+  bool any_across = false;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto [lo, hi] = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
+    across[axis] = lo == hi;
+    any_across = any_across || across[axis];
+    if (across[axis] ? lo > box.hi[axis] || hi < box.lo[axis]
+                     : lo >= box.hi[axis] || hi <= box.lo[axis]) {
+      return false;
+    }
+    if (!across[axis] && box.lo[axis] == box.hi[axis]) return false;
+  }
+  if (!any_across && separated_by_plane(corners, box, true)) return false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (any_across && !across[axis]) continue;
+      if (separated_across_edge(corners, box, corners[i], corners[(i + 1) % 3], axis, true)) {
+        return false;
+      }
+    }
   }
   return true;
 }

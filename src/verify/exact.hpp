@@ -41,6 +41,11 @@ struct ExactBox {
 [[nodiscard]] bool exact_overlap(const Corners& corners, const ExactBox& box);
 [[nodiscard]] bool exact_overlap(const Corners& corners, const Box& box);
 
+/// Whether a piece of the triangle that has an area lies in the closed box, exactly: a triangle
+/// that only touches the box, or lies outside but for an edge, has none there. (One that lies in a
+/// side of the box does.) The triangle must have an area.
+[[nodiscard]] bool exact_shares_area(const Corners& corners, const ExactBox& box);
+
 /// The widest gap between triangle and box along any separating axis, in double: at most their
 /// distance up to rounding, and not positive (up to rounding) where they overlap.
 [[nodiscard]] double separation(const Corners& corners, const ExactBox& box);

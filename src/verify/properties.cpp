@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "verify/exact.hpp"
+#include "verify/sah_properties.hpp"
 
 namespace zkd::verify {
 namespace {
@@ -49,10 +50,12 @@ bool is_nearly(float stored, double x) {
 
 class Checker {
  public:
-  Checker(const TreeView& tree, References references, const TriangleView& triangles)
+  Checker(const TreeView& tree, References references, const TriangleView& triangles,
+          Builder builder)
       : tree_(tree),
         triangles_(triangles),
         strict_(references == References::all),
+        sah_(builder == Builder::sah),
         scale_(static_cast<double>(tree.scale())) {}
 
   std::vector<std::string> run() {
@@ -70,7 +73,8 @@ class Checker {
     } else {
       listed_once();
     }
-    if (messages_.empty()) child_boxes();
+    if (messages_.empty() && !sah_) child_boxes();
+    if (messages_.empty() && sah_) report_if(5, clipped_boxes({tree_, corners_, cells_}));
     if (messages_.empty() && !strict_) planes_separate_centres();
     return std::move(messages_);
   }
@@ -90,6 +94,10 @@ class Checker {
     text << "property " << property << ": ";
     (text << ... << parts);
     messages_.push_back(text.str());
+  }
+
+  void report_if(int property, const std::string& violation) {
+    if (!violation.empty()) report(property, violation);
   }
 
   // All positions from here on are in tree space.
@@ -244,7 +252,9 @@ class Checker {
       const auto plane = static_cast<double>(node.plane);
       const double lo = entry.cell.lo[node.axis];
       const double hi = entry.cell.hi[node.axis];
-      const bool inside = lo < plane && (plane < hi || (plane == hi && !entry.cut[node.axis]));
+      const bool inside =
+          sah_ ? lo <= plane && plane <= hi && lo < hi
+               : lo < plane && (plane < hi || (plane == hi && !entry.cut[node.axis]));
       if (!inside) {
         report(2, "the plane of node ", entry.link.index(), ", ", axis_name[node.axis], " = ",
                node.plane, ", is not inside its cell, ", lo, " to ", hi);
@@ -315,6 +325,7 @@ class Checker {
       largest = std::max({largest, std::abs(scene_.lo[axis]), std::abs(scene_.hi[axis])});
     }
     std::vector<std::uint32_t> wanted;
+    std::vector<std::uint32_t> listed;
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       const auto begin = leaves_of.begin() + first[i];
       const auto end = leaves_of.begin() + first[i + 1];
@@ -328,9 +339,16 @@ class Checker {
         report(3, "triangle ", i, " is listed twice in leaf ", *twice);
         return;
       }
+      if (sah_) {
+        listed.assign(begin, end);
+        if (!covered({tree_, corners_, cells_}, scene_, *corners_[i], listed)) {
+          report(3, "triangle ", i, " is not listed everywhere that a piece of it lies");
+          return;
+        }
+      }
       overlapped_leaves(i, wanted);
       for (const std::uint32_t leaf : wanted) {
-        if (!std::binary_search(begin, end, leaf)) {
+        if (!sah_ && !std::binary_search(begin, end, leaf)) {
           report(3, "triangle ", i, " overlaps the cell of leaf ", leaf,
                  ", but is not listed there");
           return;
@@ -434,6 +452,7 @@ class Checker {
   const TreeView tree_;
   const TriangleView triangles_;
   const bool strict_;
+  const bool sah_;
   const double scale_;
   std::vector<std::string> messages_;
   std::vector<std::optional<Corners>> corners_;  // of valid triangles
@@ -445,12 +464,12 @@ class Checker {
 }  // namespace
 
 std::vector<std::string> check_tree(const Tree& tree, const TriangleView& triangles) {
-  return check_tree(tree.view(), tree.options().references, triangles);
+  return check_tree(tree.view(), tree.options().references, triangles, tree.options().builder);
 }
 
 std::vector<std::string> check_tree(const TreeView& tree, References references,
-                                    const TriangleView& triangles) {
-  return Checker(tree, references, triangles).run();
+                                    const TriangleView& triangles, Builder builder) {
+  return Checker(tree, references, triangles, builder).run();
 }
 
 std::uint32_t tree_depth(const TreeView& tree) {
