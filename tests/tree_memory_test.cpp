@@ -46,6 +46,18 @@ BuildOptions options_for(References references, std::uint32_t code_bits = 0) {
   return options;
 }
 
+// Each way to build that takes its memory in another way.
+std::vector<BuildOptions> ways() {
+  std::vector<BuildOptions> all = {options_for(References::once), options_for(References::all),
+                                   options_for(References::all)};
+  all.back().builder = Builder::sah;
+  return all;
+}
+
+std::string name(const BuildOptions& way) {
+  return std::string(to_string(way.builder)) + " " + to_string(way.references);
+}
+
 // The default resource refuses everything while this lives.
 class NoDefaultMemory {
  public:
@@ -71,18 +83,20 @@ TEST(TreeMemory, OperatorNewIsCounted) {
 
 TEST(TreeMemory, NothingIsAllocatedElsewhere) {
   for (const test::NamedMesh& m : meshes()) {
-    for (const References references : {References::once, References::all}) {
-      SCOPED_TRACE(m.name + ", " + to_string(references));
+    for (const BuildOptions& way : ways()) {
+      SCOPED_TRACE(m.name + ", " + name(way));
       CountingResource memory;
       const cpu::Executor executor{.threads = 3, .memory = &memory};
-      const BuildOptions options = options_for(references);
       const NoDefaultMemory none;
       const std::size_t before = news;
       {
-        const Tree tree = build(executor, m.mesh.view(), options);
+        const Tree tree = build(executor, m.mesh.view(), way);
         EXPECT_EQ(news - before, 0u) << "operator new was called";
         EXPECT_LE(memory.live_blocks(), 2u) << "nodes with leaf offsets, references";
         EXPECT_EQ(memory.live_bytes(), tree.statistics().tree_bytes);
+        EXPECT_LE(memory.peak_bytes(),
+                  tree.statistics().tree_bytes + tree.statistics().workspace_bytes)
+            << "statistics report less than was held";
       }
       EXPECT_EQ(memory.live_bytes(), 0u);
       EXPECT_EQ(memory.live_blocks(), 0u);
@@ -206,10 +220,10 @@ void expect_every_refusal_is_survived(const Work& work) {
 
 TEST(TreeMemory, EveryRefusalIsOneErrorAndNoLeak) {
   for (const test::NamedMesh& m : meshes()) {
-    for (const References references : {References::once, References::all}) {
-      SCOPED_TRACE(m.name + ", " + to_string(references));
+    for (const BuildOptions& way : ways()) {
+      SCOPED_TRACE(m.name + ", " + name(way));
       expect_every_refusal_is_survived([&](CountingResource& memory) {
-        (void)build({.threads = 2, .memory = &memory}, m.mesh.view(), options_for(references));
+        (void)build({.threads = 2, .memory = &memory}, m.mesh.view(), way);
       });
     }
   }
@@ -239,9 +253,10 @@ TEST(TreeMemory, EveryRefusalInAStageIsOneErrorAndNoLeak) {
 
 TEST(TreeMemory, TooLittleMemoryIsAnError) {
   const scene::Mesh mesh = scene::soup(5000, 35);
-  for (const References references : {References::once, References::all}) {
+  for (const BuildOptions& way : ways()) {
+    SCOPED_TRACE(name(way));
     CountingResource whole;
-    (void)build({.threads = 2, .memory = &whole}, mesh.view(), options_for(references));
+    (void)build({.threads = 2, .memory = &whole}, mesh.view(), way);
     const std::size_t need = whole.peak_bytes();
     std::vector<std::size_t> limits = {need - 1, need};
     for (std::size_t tenths = 0; tenths < 10; ++tenths) limits.push_back(need / 10 * tenths);
@@ -249,7 +264,7 @@ TEST(TreeMemory, TooLittleMemoryIsAnError) {
       CountingResource memory;
       memory.limit = limit;
       try {
-        (void)build({.threads = 2, .memory = &memory}, mesh.view(), options_for(references));
+        (void)build({.threads = 2, .memory = &memory}, mesh.view(), way);
         EXPECT_EQ(limit, need) << "less was enough";
       } catch (const Error& error) {
         EXPECT_NE(limit, need) << "what was enough before";

@@ -16,6 +16,7 @@
 #include "cpu/backend.hpp"
 #include "cpu/sah/divide.hpp"
 #include "cpu/sah/front.hpp"
+#include "cpu/sah/rounding.hpp"
 
 namespace zkd::cpu::sah {
 namespace {
@@ -80,20 +81,22 @@ class Build {
   // The root: every valid triangle with its box in tree space.
   Block place_references(Part& root) {
     root.count = counts().listed;
-    root.cell = input_.state->frame.bounds;
     Block block =
         lay_out_block(memory_, [&](core::Arena& arena) { take_part(arena, root.count, root); });
-    const auto scale = static_cast<float>(input_.state->frame.scale);
-    threads_.share(root.count, grain, [&root, scale, input = input_](Range range) {
+    // Scaling may underflow, then boxes are rounded outwards.
+    const auto in_tree_space = [scale = input_.state->frame.scale](const Box& box) {
+      Box scaled;
+      for (int a = 0; a < 3; ++a) {
+        scaled.lo[a] = float_below(static_cast<double>(box.lo[a]) * scale);
+        scaled.hi[a] = float_above(static_cast<double>(box.hi[a]) * scale);
+      }
+      return scaled;
+    };
+    if (root.count > 0) root.cell = in_tree_space(input_.state->report.bounds);
+    threads_.share(root.count, grain, [&root, in_tree_space, input = input_](Range range) {
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
-        Reference& reference = root.references[i];
-        reference.id = input.ids[i];
-        const Box& box = input.boxes[reference.id];
-        for (int a = 0; a < 3; ++a) {
-          // Adding +0 turns a -0 from underflow into +0.
-          reference.box.lo[a] = box.lo[a] * scale + 0.0F;
-          reference.box.hi[a] = box.hi[a] * scale + 0.0F;
-        }
+        const std::uint32_t id = input.ids[i];
+        root.references[i] = {in_tree_space(input.boxes[id]), id};
       }
     });
     return block;

@@ -12,6 +12,7 @@
 #include <zkd/traversal/triangle.hpp>
 
 #include "core/frame.hpp"
+#include "cpu/sah/rounding.hpp"
 
 namespace zkd::cpu::sah {
 
@@ -60,8 +61,8 @@ class Clipper {
         lo = core::smaller(lo, corner.is_cut ? corner.p[a] - slack_ : corner.p[a]);
         hi = core::larger(hi, corner.is_cut ? corner.p[a] + slack_ : corner.p[a]);
       }
-      box.lo[a] = core::larger(box.lo[a], -float_above(-lo) + 0.0F);
-      box.hi[a] = core::smaller(box.hi[a], float_above(hi) + 0.0F);
+      box.lo[a] = core::larger(box.lo[a], float_below(lo));
+      box.hi[a] = core::smaller(box.hi[a], float_above(hi));
     }
     return !box.empty();
   }
@@ -121,15 +122,6 @@ class Clipper {
     for (int b = 0; b < 3; ++b) corner.p[b] = b == a ? h : kept.p[b] + s * (lost.p[b] - kept.p[b]);
     corner.is_cut = true;
     return corner;
-  }
-
-  /// The smallest float that is not below x.
-  static float float_above(double x) {
-    const auto nearest = static_cast<float>(x);
-    if (static_cast<double>(nearest) >= x) return nearest;
-    const std::uint32_t bits = core::bits_of(nearest);
-    if (nearest == 0.0F) return core::float_of(1);  // the smallest denormal
-    return core::float_of(nearest > 0.0F ? bits + 1 : bits - 1);
   }
 
   TriangleView triangles_;

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Doubles to floats outwards, so that boxes hold what they are made for.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/traversal/arithmetic.hpp>
+
+namespace zkd::cpu::sah {
+
+/// The smallest float that is not below x. Never -0; |x| must be that of a float.
+inline float float_above(double x) {
+  const float nearest = static_cast<float>(x) + 0.0F;
+  if (static_cast<double>(nearest) >= x) return nearest;
+  const std::uint32_t bits = core::bits_of(nearest);
+  return core::float_of(nearest >= 0.0F ? bits + 1 : bits - 1) + 0.0F;
+}
+
+/// The largest float that is not above x; likewise.
+inline float float_below(double x) { return -float_above(-x) + 0.0F; }
+
+}  // namespace zkd::cpu::sah
