@@ -57,7 +57,9 @@ TEST_P(SahQuery, EveryAnswerIsThatOfBruteForce) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
     SCOPED_TRACE(m.name + ", seed " + std::to_string(seed));
     const Tree tree = build(cpu::Executor{}, m.mesh.view(), options_for(seed));
-    const std::vector<Ray> rays = scene::hard_rays(m.mesh, tree.view(), 720, seed);
+    // Random bits make large trees, and rays that meet most of their leaves.
+    const std::uint32_t count = tree.view().reference_count() < 50000 ? 720 : 72;
+    const std::vector<Ray> rays = scene::hard_rays(m.mesh, tree.view(), count, seed);
     for (const Intersector intersector : intersectors) {
       if (intersector != Intersector::watertight && seed % 5 != 0) continue;
       expect_same_answers(tree, m.mesh, rays, intersector);
