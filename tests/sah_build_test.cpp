@@ -117,7 +117,7 @@ std::vector<test::NamedMesh> large_meshes() {
   all.push_back({"soup", scene::soup(10000, 3)});
   all.push_back({"sphere", scene::sphere(5)});
   all.push_back({"stadium", scene::small_in_large(10000, 1e4F, 3)});
-  all.push_back({"grid", scene::grid(64)});
+  all.push_back({"grid", scene::grid(14)});
   return all;
 }
 

@@ -27,10 +27,10 @@ namespace zkd {
 /// empty tree.
 ///
 /// Work for n triangles: with `once` O(n * leaf_size), plus O(log n) a leaf (the sort has a fixed
-/// number of digits); with `all` O((n + references) * depth). Builder::sah (Wald, Havran: On building
-/// fast kd-Trees for Ray Tracing, and on doing that in O(N log N), RT 2006): O(n log n) as long as few
-/// triangles lie across each plane, else O((n + references) * depth). Its memory is not bounded
-/// beforehand; it takes at most 2^30 - 1 valid triangles (too_many_triangles).
+/// number of digits); with `all` O((n + references) * depth). Builder::sah (Wald, Havran: On
+/// building fast kd-Trees for Ray Tracing, and on doing that in O(N log N), RT 2006): O(n log n) as
+/// long as few triangles lie across each plane, else O((n + references) * depth). Its memory is not
+/// bounded beforehand; it takes at most 2^30 - 1 valid triangles (too_many_triangles).
 ///
 /// Throws Error: index_out_of_range, non_finite_vertex, too_many_triangles, too_many_references,
 /// invalid_view, invalid_option, unsupported_option, backend_unavailable, out_of_memory; and on

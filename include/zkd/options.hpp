@@ -18,9 +18,10 @@ enum class Backend {
 
 /// In which leaves a triangle is listed.
 enum class References {
-  once,       ///< in the trunk of its centre only; boxes of siblings may overlap. Fastest to build
-  budget,     ///< some triangles split, within BuildOptions::budget (not in this version)
-  all,        ///< in every leaf cell it touches: a strict kd-tree with disjoint cells
+  once,    ///< in the trunk of its centre only; boxes of siblings may overlap. Fastest to build
+  budget,  ///< some triangles split, within BuildOptions::budget (not in this version)
+  all,     ///< in every leaf cell it touches: a strict kd-tree with disjoint cells. (Builder::sah:
+           ///< that a piece of it with an area lies in; if it lies in a plane, on one side)
   automatic,  ///< chosen from the scene (not in this version)
 };
 

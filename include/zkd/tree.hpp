@@ -40,8 +40,9 @@ struct Link {
 /// An inner node: an essential node of the poster, one cache line.
 ///
 /// Node j is where trunk (leaf) j and trunk j + 1 first differ, so inner nodes stand in the order
-/// of the leaves they separate; child 0 covers leaves up to j, child 1 leaves from j + 1. All
-/// positions are in tree space (TreeView::scale).
+/// of the leaves they separate; child 0 covers leaves up to j, child 1 leaves from j + 1. (So they
+/// do with every builder: leaves are numbered depth first, child 0 first, and a subtree is one
+/// range of leaves and one of nodes.) All positions are in tree space (TreeView::scale).
 ///
 ///     byte  0  bounds[0]  x: low of child 0, low of child 1, high of child 0, high of child 1
 ///          16  bounds[1]  y
@@ -149,7 +150,7 @@ class ZKD_API Tree {
             view_.references + view_.leaf_offsets[leaf + 1]};
   }
 
-  /// The lattice of the first round of codes.
+  /// The lattice of the first round of codes; of no bits with Builder::sah.
   [[nodiscard]] const Lattice& lattice() const noexcept { return lattice_; }
 
   /// The options it was built with, every `automatic` replaced by what was chosen.

@@ -25,7 +25,7 @@ void check_same(const Tree& tree, const scene::Mesh& mesh, const BuildOptions& o
                 std::uint64_t seed);
 
 /// Fails unless a build whose allocation number `refused` (from 1) is refused, if there is one, is
-/// one error and gives everything back, and unless builds of `once` keep to memory_requirement.
+/// one error and gives everything back, and unless Morton builds keep to memory_requirement.
 void check_memory(const scene::Mesh& mesh, const BuildOptions& options, std::uint32_t refused);
 
 }  // namespace zkd::fuzz
