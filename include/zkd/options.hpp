@@ -90,7 +90,7 @@ struct BuildOptions {
   /// `recode_crowded` and `reference_capacity` are not looked at either. In a device build it is
   /// ErrorCode::unsupported_option; without an executor, Backend::automatic takes the CPU for it.
   Builder builder = Builder::morton;
-  SahOptions sah;  ///< for Builder::sah
+  SahOptions sah{};  ///< for Builder::sah
 
   Quality quality = Quality::fast;
 
