@@ -6,9 +6,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <string>
 #include <utility>
 
-#include "cpu/float_environment.hpp"
 #include "cpu/sah/divide.hpp"
 
 namespace zkd::cpu::sah {
@@ -165,6 +165,8 @@ bool Front::finish_some(List<std::uint32_t>& waiting, double plenty) {
   const auto times = [plenty](double factor, std::size_t count) {
     return static_cast<std::size_t>(factor * plenty * static_cast<double>(count)) + 64;
   };
+  // No more than a tree may hold.
+  const auto limited = [](std::size_t count) { return std::min<std::size_t>(count, max_count); };
   constexpr double leaves_per_reference = 2.0;
   constexpr double references_per_reference = 3.0;
   const std::size_t share = largest + (all + all / 4) / team;
@@ -178,8 +180,8 @@ bool Front::finish_some(List<std::uint32_t>& waiting, double plenty) {
   List<Block> rooms(memory_);
   for (std::uint32_t i = 0; i < team; ++i) {
     Worker worker{};
-    worker.output.leaves = times(leaves_per_reference, share);
-    worker.output.reference_count = times(references_per_reference, share);
+    worker.output.leaves = limited(times(leaves_per_reference, share));
+    worker.output.reference_count = limited(times(references_per_reference, share));
     outputs_.add(lay_out_block(memory_, [&](core::Arena& arena) {
       worker.output.nodes = arena.take<Node>(worker.output.leaves);
       worker.output.leaf_ends = arena.take<std::uint32_t>(worker.output.leaves);
@@ -197,8 +199,8 @@ bool Front::finish_some(List<std::uint32_t>& waiting, double plenty) {
     for (std::size_t i = next++; i < waiting.size(); i = next++) {
       Top& top = tops_[waiting[i]];
       // What will hardly fit is left to the next round.
-      if (builder.left().leaves < times(leaves_per_reference, top.part.count) ||
-          builder.left().reference_count < times(references_per_reference, top.part.count))
+      if (builder.left().leaves < limited(times(leaves_per_reference, top.part.count)) ||
+          builder.left().reference_count < limited(times(references_per_reference, top.part.count)))
         continue;
       if (builder.build(top.part, top.subtree))
         top.finished = true;
@@ -206,8 +208,16 @@ bool Front::finish_some(List<std::uint32_t>& waiting, double plenty) {
         ran_out = true;
     }
   });
-  for (std::size_t i = 0; i < waiting.size(); ++i)
-    if (tops_[waiting[i]].finished) tops_[waiting[i]].block.clear();
+  bool any_finished = false;
+  for (std::size_t i = 0; i < waiting.size(); ++i) {
+    if (!tops_[waiting[i]].finished) continue;
+    tops_[waiting[i]].block.clear();
+    any_finished = true;
+  }
+  if (!any_finished && times(leaves_per_reference, share) > max_count)
+    throw Error(ErrorCode::too_many_references, max_count + 1,
+                "builder sah needs at least " + std::to_string(max_count + 1) +
+                    " leaves or references, and a tree holds at most " + std::to_string(max_count));
   return ran_out;
 }
 

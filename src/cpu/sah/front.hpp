@@ -44,7 +44,8 @@ class Front {
         tops_(memory),
         outputs_(memory) {}
 
-  /// Builds everything that comes of the part that lies in `block`. Throws Error out_of_memory.
+  /// Builds everything that comes of the part that lies in `block`. Throws Error out_of_memory,
+  /// too_many_references.
   void build(Block block, const Part& root);
 
   /// The root is the first. Valid after build().
