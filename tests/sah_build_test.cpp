@@ -284,6 +284,24 @@ TEST(SahBuild, SaysWhatItUsed) {
   EXPECT_EQ(tree_hash(build(mesh.view(), options).view()), tree_hash(tree.view()));
 }
 
+TEST(SahBuild, QualityHighHandsOverToIt) {
+  const scene::Mesh mesh = scene::soup(500, 9);
+  const BuildOptions high{.quality = Quality::high};
+  const Tree trees[] = {build(mesh.view(), high), build(cpu::Executor{}, mesh.view(), high)};
+  for (const Tree& tree : trees) {
+    EXPECT_EQ(tree.options().builder, Builder::sah);
+    EXPECT_EQ(tree.options().quality, Quality::high);
+    EXPECT_EQ(tree_hash(tree.view()),
+              tree_hash(build(mesh.view(), {.builder = Builder::sah}).view()));
+  }
+  try {
+    (void)memory_requirement(cpu::Executor{}, 500, high);
+    FAIL() << "what it takes is not known beforehand";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::unsupported_option);
+  }
+}
+
 // One that does nothing would not be one.
 TEST(SahBuild, EveryOptionChangesTheTree) {
   const scene::Mesh mesh = scene::soup(500, 9);

@@ -202,10 +202,10 @@ Json json_of(const Leaks& e5) {
 
 Json json_of(const TreeQuality& quality) {
   return {{"scene", quality.scene},
-          {"references", quality.references},
+          {"tree", quality.tree},
           {"triangles", quality.triangles},
           {"sah", quality.sah_cost},
-          {"sah_over_exact_sah", nullptr},  // there is no exact-SAH builder in this version
+          {"sah_over_exact_sah", quality.sah_over_exact},
           {"node_visits_per_ray", quality.node_visits_per_ray},
           {"triangle_tests_per_ray", quality.triangle_tests_per_ray},
           {"references_per_triangle", quality.references_per_triangle},

@@ -82,48 +82,60 @@ class HashComparison {
   Determinism result_;
 };
 
+TreeQuality quality_of(const std::string& name, BuildOptions options, const TestScene& scene,
+                       const std::vector<RaySet>& sets, const cpu::Executor& executor) {
+  const TriangleView triangles = scene.mesh.view();
+  options.measure_quality = true;
+  const Tree tree = zkd::build(executor, triangles, options);
+  TreeQuality quality;
+  quality.scene = scene.name;
+  quality.tree = name;
+  quality.triangles = triangles.triangle_count;
+  quality.sah_cost = tree.statistics().sah_cost;
+  quality.references_per_triangle =
+      static_cast<double>(tree.view().reference_count()) /
+      static_cast<double>(std::max<std::size_t>(1, triangles.triangle_count));
+  quality.tree_bytes = tree.statistics().tree_bytes;
+  quality.depth = tree.statistics().depth;
+
+  std::uint64_t rays = 0;
+  std::uint64_t visits = 0;
+  std::uint64_t tests = 0;
+  for (const RaySet& set : sets) {
+    if (set.group != "workload") continue;
+    std::vector<Hit> hits(set.rays.size());
+    std::vector<TraversalCost> costs(set.rays.size());
+    zkd::closest_hit(executor, tree.view(), triangles, set.rays, hits, costs);
+    for (const TraversalCost& cost : costs) {
+      visits += cost.node_visits;
+      tests += cost.triangle_tests;
+    }
+    rays += set.rays.size();
+    quality.deepest_stack =
+        std::max(quality.deepest_stack, deepest_stack(executor, tree.view(), triangles, set.rays));
+  }
+  if (rays > 0) {
+    quality.node_visits_per_ray = static_cast<double>(visits) / static_cast<double>(rays);
+    quality.triangle_tests_per_ray = static_cast<double>(tests) / static_cast<double>(rays);
+  }
+  return quality;
+}
+
 }  // namespace
 
 std::vector<TreeQuality> measure_quality(const TestScene& scene, const std::vector<RaySet>& sets,
                                          const cpu::Executor& executor) {
+  BuildOptions sah = options_with(References::all);
+  sah.builder = Builder::sah;
   std::vector<TreeQuality> qualities;
-  const TriangleView triangles = scene.mesh.view();
+  qualities.push_back(quality_of("exact SAH", sah, scene, sets, executor));
   for (const References references : {References::once, References::all}) {
-    BuildOptions options = options_with(references);
-    options.measure_quality = true;
-    const Tree tree = zkd::build(executor, triangles, options);
-    TreeQuality quality;
-    quality.scene = scene.name;
-    quality.references = zkd::to_string(references);
-    quality.triangles = triangles.triangle_count;
-    quality.sah_cost = tree.statistics().sah_cost;
-    quality.references_per_triangle =
-        static_cast<double>(tree.view().reference_count()) /
-        static_cast<double>(std::max<std::size_t>(1, triangles.triangle_count));
-    quality.tree_bytes = tree.statistics().tree_bytes;
-    quality.depth = tree.statistics().depth;
-
-    std::uint64_t rays = 0;
-    std::uint64_t visits = 0;
-    std::uint64_t tests = 0;
-    for (const RaySet& set : sets) {
-      if (set.group != "workload") continue;
-      std::vector<Hit> hits(set.rays.size());
-      std::vector<TraversalCost> costs(set.rays.size());
-      zkd::closest_hit(executor, tree.view(), triangles, set.rays, hits, costs);
-      for (const TraversalCost& cost : costs) {
-        visits += cost.node_visits;
-        tests += cost.triangle_tests;
-      }
-      rays += set.rays.size();
-      quality.deepest_stack = std::max(quality.deepest_stack,
-                                       deepest_stack(executor, tree.view(), triangles, set.rays));
-    }
-    if (rays > 0) {
-      quality.node_visits_per_ray = static_cast<double>(visits) / static_cast<double>(rays);
-      quality.triangle_tests_per_ray = static_cast<double>(tests) / static_cast<double>(rays);
-    }
-    qualities.push_back(quality);
+    qualities.push_back(
+        quality_of(zkd::to_string(references), options_with(references), scene, sets, executor));
+  }
+  const double exact = qualities.front().sah_cost;
+  for (TreeQuality& quality : qualities) {
+    quality.sah_over_exact = exact > 0.0 ? quality.sah_cost / exact : 0.0;
   }
   return qualities;
 }

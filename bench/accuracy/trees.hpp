@@ -16,9 +16,10 @@ namespace zkd::bench::accuracy {
 /// E6: one tree of one scene.
 struct TreeQuality {
   std::string scene;
-  std::string references;
+  std::string tree;  ///< "once", "all", or "exact SAH": Builder::sah
   std::uint64_t triangles = 0;
-  double sah_cost = 0.0;  ///< Statistics::sah_cost
+  double sah_cost = 0.0;        ///< Statistics::sah_cost
+  double sah_over_exact = 0.0;  ///< over that of the exact-SAH tree
   double node_visits_per_ray = 0.0;
   double triangle_tests_per_ray = 0.0;
   double references_per_triangle = 0.0;
@@ -27,7 +28,7 @@ struct TreeQuality {
   std::uint32_t deepest_stack = 0;  ///< entries that waited at once, over these rays
 };
 
-/// `once` and `all`, on the workload of `sets`.
+/// The exact-SAH tree, `once` and `all`, on the workload of `sets`.
 [[nodiscard]] std::vector<TreeQuality> measure_quality(const TestScene& scene,
                                                        const std::vector<RaySet>& sets,
                                                        const cpu::Executor& executor);

@@ -36,7 +36,7 @@ enum class Builder {
 enum class Quality {
   fast,      ///< one sweep
   balanced,  ///< not in this version
-  high,      ///< not in this version
+  high,      ///< hands over to Builder::sah, with all that is said there
 };
 
 /// What happens to a triangle with a NaN or infinite coordinate. (An index out of range is always

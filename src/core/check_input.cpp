@@ -66,9 +66,9 @@ void check_ranges(const BuildOptions& options) {
 /// What this version does not have.
 void check_supported(const BuildOptions& options) {
   if (options.builder == Builder::wu2011) unsupported("builder", to_string(options.builder));
+  if (builder_for(options) != Builder::morton) return;
   if (options.quality != Quality::fast) unsupported("quality", to_string(options.quality));
-  if (options.builder == Builder::morton &&
-      (options.references == References::budget || options.references == References::automatic))
+  if (options.references == References::budget || options.references == References::automatic)
     unsupported("references", to_string(options.references));
 }
 
@@ -115,8 +115,9 @@ void check_view(const TriangleView& triangles) {
 
 void check_options(const BuildOptions& options) {
   check_ranges(options);
-  if (options.builder == Builder::sah)
-    fail(ErrorCode::unsupported_option, 0, "builder sah is only there for builds on the CPU");
+  if (builder_for(options) == Builder::sah)
+    fail(ErrorCode::unsupported_option, 0,
+         "builder sah (and quality high) is only there for builds on the CPU");
   check_supported(options);
 }
 

@@ -17,6 +17,12 @@ ZKD_API void check_view(const TriangleView& triangles);
 /// Throws Error too_many_triangles.
 ZKD_API void check_count(std::uint64_t triangle_count);
 
+/// The builder that makes the tree: Quality::high hands over to Builder::sah.
+[[nodiscard]] constexpr Builder builder_for(const BuildOptions& options) {
+  return options.builder == Builder::morton && options.quality == Quality::high ? Builder::sah
+                                                                                : options.builder;
+}
+
 /// For the Morton builder. Throws Error invalid_option or unsupported_option.
 ZKD_API void check_options(const BuildOptions& options);
 

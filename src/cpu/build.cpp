@@ -51,8 +51,10 @@ Tree build(const cpu::Executor& executor, const TriangleView& triangles,
   core::check_cpu_options(options);
   core::check_view(triangles);
   cpu::check_executor(executor);
-  Tree tree = options.builder == Builder::sah ? cpu::sah::build(executor, triangles, options)
-                                              : build_morton(executor, triangles, options);
+  BuildOptions used = options;
+  used.builder = core::builder_for(options);
+  Tree tree = used.builder == Builder::sah ? cpu::sah::build(executor, triangles, used)
+                                           : build_morton(executor, triangles, used);
   Statistics& statistics = TreeAssembler::statistics(tree);
   statistics.total_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -60,7 +62,8 @@ Tree build(const cpu::Executor& executor, const TriangleView& triangles,
 }
 
 Tree build(const TriangleView& triangles, const BuildOptions& options) {
-  const bool only_on_cpu = options.builder == Builder::sah && options.backend != Backend::cuda;
+  const bool only_on_cpu =
+      core::builder_for(options) == Builder::sah && options.backend != Backend::cuda;
   if (only_on_cpu)
     core::check_cpu_options(options);
   else
@@ -79,7 +82,7 @@ MemoryRequirement memory_requirement(const cpu::Executor& executor, std::uint64_
                                      const BuildOptions& options, std::uint64_t reference_count) {
   cpu::check_executor(executor);
   core::check_cpu_options(options);
-  if (options.builder == Builder::sah)
+  if (core::builder_for(options) == Builder::sah)
     throw Error(ErrorCode::unsupported_option, 0,
                 "what builder sah takes is not known beforehand: memory_requirement is for others");
   core::check_count(triangle_count);

@@ -47,7 +47,8 @@ inline bool may_pay(const Part& part, const SahOptions& options) {
   const double least =
       static_cast<double>(options.visit_cost) *
       (options.areas == SahAreas::tight ? 1.0 : 1.0 - static_cast<double>(options.empty_bonus));
-  return part.depth<max_depth&& static_cast<double>(options.test_cost) * part.count> least;
+  const double tests = static_cast<double>(options.test_cost) * part.count;
+  return part.depth < max_depth && tests > least;
 }
 
 /// Room that sweep() needs: numbers of type double for a part with so many events along an axis.
