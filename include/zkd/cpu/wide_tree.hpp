@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A second form of a finished tree, for rays on the CPU: nodes with up to eight children and leaves
+// with copies of their triangles, laid out for vector instructions.
+//
+// It is optional. `widen` makes it from any Tree, whoever built that, and every answer through it
+// has the bits of the query on the tree itself (zkd/query.hpp, whose rules hold here word for
+// word). Making it takes about as long as tracing one to three rays for each triangle, and then
+// each ray takes between a half and two thirds of the time: it pays from a few rays per triangle
+// on. A scene that is traced less, or changes with every frame, is traced through its Tree.
+//
+// It is a snapshot: it owns copies of the triangles' positions and needs neither the tree nor the
+// triangles any more. What changes there later does not reach it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory_resource>
+#include <optional>
+#include <span>
+
+#include <zkd/config.hpp>
+#include <zkd/cpu/executor.hpp>
+#include <zkd/geometry.hpp>
+#include <zkd/query.hpp>
+#include <zkd/tree.hpp>
+
+namespace zkd::cpu {
+
+/// Children of a node, and triangles of a block: floats in a register of AVX2.
+inline constexpr int wide = 8;
+
+/// A node: several levels of nodes of the tree in one, by surface area. Boxes are in tree space
+/// (TreeView::scale); those that are unused are empty (+inf, -inf) and stand at the end.
+///
+///     byte   0  bounds[0]  x: eight lows, eight highs
+///           64  bounds[1]  y
+///          128  bounds[2]  z
+///          192  child      a node, or a leaf: the number of its first block
+struct alignas(32) WideNode {
+  float bounds[3][2][wide];
+  Link child[wide];
+};
+static_assert(sizeof(WideNode) == 224);
+
+/// Up to eight triangles of a leaf. A leaf is one or more blocks in a row, the last of them marked.
+struct alignas(64) TriangleBlock {
+  static constexpr std::uint32_t last_bit = 0x80000000u;
+  static constexpr std::uint32_t unused = 0x7FFFFFFFu;  ///< the id of a lane without a triangle
+
+  float positions[3][3][wide];  ///< corner, axis; as the caller gave them; NaN where unused
+  std::uint32_t ids[wide];      ///< of ids[0], bit 31: the leaf ends with this block
+
+  [[nodiscard]] bool is_last() const { return (ids[0] & last_bit) != 0; }
+  [[nodiscard]] std::uint32_t id(std::uint32_t lane) const { return ids[lane] & ~last_bit; }
+};
+static_assert(sizeof(TriangleBlock) == 320);
+
+/// A non-owning view of a wide tree: plain, valid as long as its owner.
+struct WideTreeView {
+  const TreeHeader* header = nullptr;     ///< that of the tree, but for `root`; null: empty
+  const WideNode* nodes = nullptr;        ///< depth first, from the root
+  const TriangleBlock* blocks = nullptr;  ///< near the node that they hang on
+  std::uint32_t node_count = 0;
+  std::uint32_t block_count = 0;
+
+  [[nodiscard]] Link root() const { return header != nullptr ? header->root : Link{}; }
+};
+
+/// Owns a wide tree: one block from the memory resource it was made with. Movable; one that was
+/// moved from is empty. Reading one from several threads is safe.
+class ZKD_API WideTree {
+ public:
+  /// An empty tree: every ray misses.
+  WideTree() = default;
+  WideTree(WideTree&& other) noexcept;
+  WideTree& operator=(WideTree&& other) noexcept;
+  WideTree(const WideTree&) = delete;             // megabytes: make it again
+  WideTree& operator=(const WideTree&) = delete;  // likewise
+  ~WideTree();
+
+  /// What queries take. Valid until this is destroyed, assigned or moved from.
+  [[nodiscard]] const WideTreeView& view() const noexcept { return view_; }
+
+  /// Bytes that it holds: 320 for each block and 224 for each node, of which there is one for every
+  /// three to six blocks. That is 60 to 90 bytes for each triangle of a tree that references it
+  /// once, and as much for each place where References::all references it.
+  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
+
+ private:
+  friend struct WideTreeAssembler;
+  void swap(WideTree& other) noexcept;
+
+  WideTreeView view_;
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;
+  std::pmr::memory_resource* memory_ = nullptr;
+};
+
+/// The wide form of `tree`, which was built from `triangles` (or a copy of its data at other
+/// addresses), by any builder. Bytes are the same for any number of threads and instruction set.
+///
+/// Takes from `executor.memory` what the result holds and, while it works, at most 256 KB besides.
+/// Nodes are collapsed by surface area: the child with the largest box is replaced by its two
+/// children until there are eight (Wald, Benthin, Boulos: Getting Rid of Packets, RT 2008). Parts
+/// of the tree that list eight triangles or fewer become one leaf. O(references) work.
+///
+/// Throws Error: invalid_view, invalid_option as build(); index_out_of_range naming a reference
+/// to a triangle that `triangles` does not have; out_of_memory. Then nothing is held.
+[[nodiscard]] ZKD_API WideTree widen(const Executor& executor, const TreeView& tree,
+                                     const TriangleView& triangles);
+
+/// zkd::closest_hit of the tree that it was made from, bit for bit.
+[[nodiscard]] ZKD_API std::optional<Hit> closest_hit(
+    const WideTreeView& tree, const Ray& ray,
+    Intersector intersector = Intersector::watertight) noexcept;
+
+/// zkd::any_hit likewise.
+[[nodiscard]] ZKD_API bool any_hit(const WideTreeView& tree, const Ray& ray,
+                                   Intersector intersector = Intersector::watertight) noexcept;
+
+/// zkd::closest_hit for each ray, on all threads of the executor. Of `costs`, node_visits counts
+/// nodes of eight children, and triangle_tests each triangle in the blocks that were looked at.
+ZKD_API void closest_hit(const Executor& executor, const WideTreeView& tree,
+                         std::span<const Ray> rays, std::span<Hit> hits,
+                         std::span<TraversalCost> costs = {},
+                         Intersector intersector = Intersector::watertight) noexcept;
+
+/// zkd::any_hit for each ray. As above otherwise.
+ZKD_API void any_hit(const Executor& executor, const WideTreeView& tree, std::span<const Ray> rays,
+                     std::span<std::uint8_t> occluded, std::span<TraversalCost> costs = {},
+                     Intersector intersector = Intersector::watertight) noexcept;
+
+}  // namespace zkd::cpu

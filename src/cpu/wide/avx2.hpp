@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Eight boxes and eight triangles at once, for AVX2 and FMA.
+#pragma once
+
+#include <cstdint>
+
+#include <zkd/traversal/ray.hpp>
+
+#include "cpu/instruction_set.hpp"
+#include "cpu/wide/walk.hpp"
+
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <immintrin.h>
+
+namespace zkd::cpu {
+
+/// core::BoxTest of eight children, with the roundings of Avx2BoxTest.
+class Avx2WideBoxes {
+ public:
+  ZKD_CPU_AVX2 explicit Avx2WideBoxes(const core::PreparedRay& ray)
+      : first_(_mm256_set1_ps(ray.first.value)) {
+    for (std::uint32_t a = 0; a < 3; ++a) {
+      origin_[a] = _mm256_set1_ps(ray.origin[a].value);
+      inverse_[a] = _mm256_set1_ps(ray.inverse[a].value);
+      leaving_[a] = _mm256_set1_ps((ray.inverse[a] * ray.far_slack).value);
+      padding_[a] = _mm256_set1_ps(ray.padding[a].value);
+      near_[a] = ray.is_negative(a) ? 1 : 0;
+    }
+  }
+
+  ZKD_CPU_AVX2 void operator()(const WideNode& node, core::Real last, WideEntries& entries) const {
+    __m256 near = first_;
+    __m256 far = _mm256_set1_ps(last.value);
+    for (int a = 0; a < 3; ++a) {
+      const __m256 to_near =
+          _mm256_sub_ps(_mm256_load_ps(node.bounds[a][near_[a]]), origin_[a]);
+      const __m256 to_far =
+          _mm256_sub_ps(_mm256_load_ps(node.bounds[a][1 - near_[a]]), origin_[a]);
+      near = _mm256_max_ps(near, _mm256_fmsub_ps(to_near, inverse_[a], padding_[a]));
+      far = _mm256_min_ps(far, _mm256_fmadd_ps(to_far, leaving_[a], padding_[a]));
+    }
+    _mm256_store_ps(entries.t, near);
+    entries.hit =
+        static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(near, far, _CMP_LE_OQ)));
+  }
+
+ private:
+  __m256 first_;
+  __m256 origin_[3];
+  __m256 inverse_[3];
+  __m256 leaving_[3];
+  __m256 padding_[3];
+  std::size_t near_[3];
+};
+
+/// core::surely_misses of eight triangles.
+class Avx2Lanes {
+ public:
+  ZKD_CPU_AVX2 explicit Avx2Lanes(const core::PreparedRay& ray)
+      : ray_(ray), scale_(_mm256_set1_ps(ray.scale.value)) {
+    for (int i = 0; i < 3; ++i) origin_[i] = _mm256_set1_ps(ray.permuted_origin[i].value);
+    for (int i = 0; i < 2; ++i) shear_[i] = _mm256_set1_ps(ray.shear[i].value);
+  }
+
+  /// The lanes that are left. One without a triangle never is.
+  ZKD_CPU_AVX2 std::uint32_t operator()(const TriangleBlock& block) const {
+    const __m256 no_sign = _mm256_castsi256_ps(_mm256_set1_epi32(0x7FFFFFFF));
+    __m256 x[3];
+    __m256 y[3];
+    __m256 size_x = _mm256_setzero_ps();
+    __m256 size_y = _mm256_setzero_ps();
+    __m256 across_x = _mm256_setzero_ps();
+    __m256 across_y = _mm256_setzero_ps();
+    for (int corner = 0; corner < 3; ++corner) {
+      const __m256 along = from_origin(block, corner, 2);
+      const __m256 right = from_origin(block, corner, 0);
+      const __m256 up = from_origin(block, corner, 1);
+      x[corner] = _mm256_fnmadd_ps(shear_[0], along, right);
+      y[corner] = _mm256_fnmadd_ps(shear_[1], along, up);
+      const __m256 depth = _mm256_and_ps(along, no_sign);
+      size_x = _mm256_max_ps(size_x, _mm256_add_ps(_mm256_and_ps(right, no_sign), depth));
+      size_y = _mm256_max_ps(size_y, _mm256_add_ps(_mm256_and_ps(up, no_sign), depth));
+      across_x = _mm256_max_ps(across_x, _mm256_and_ps(x[corner], no_sign));
+      across_y = _mm256_max_ps(across_y, _mm256_and_ps(y[corner], no_sign));
+    }
+    const __m256 w0 = _mm256_fmsub_ps(x[2], y[1], _mm256_mul_ps(y[2], x[1]));
+    const __m256 w1 = _mm256_fmsub_ps(x[0], y[2], _mm256_mul_ps(y[0], x[2]));
+    const __m256 w2 = _mm256_fmsub_ps(x[1], y[0], _mm256_mul_ps(y[1], x[0]));
+
+    const __m256 units = _mm256_set1_ps(6.0F * 0x1p-24F);
+    const __m256 error_x = _mm256_mul_ps(units, size_x);
+    const __m256 error_y = _mm256_mul_ps(units, size_y);
+    const __m256 half = _mm256_fmadd_ps(error_y, across_x,
+                                        _mm256_mul_ps(error_x, _mm256_add_ps(across_y, error_y)));
+    const __m256 bound = _mm256_max_ps(_mm256_add_ps(half, half), _mm256_set1_ps(0x1p-96F));
+    const __m256 least = _mm256_min_ps(w0, _mm256_min_ps(w1, w2));
+    const __m256 most = _mm256_max_ps(w0, _mm256_max_ps(w1, w2));
+    // Ordered comparisons: where there is no triangle all is NaN.
+    const __m256 may = _mm256_or_ps(
+        _mm256_cmp_ps(least, _mm256_sub_ps(_mm256_setzero_ps(), bound), _CMP_GE_OQ),
+        _mm256_cmp_ps(most, bound, _CMP_LE_OQ));
+    return static_cast<std::uint32_t>(_mm256_movemask_ps(may));
+  }
+
+ private:
+  ZKD_CPU_AVX2 __m256 from_origin(const TriangleBlock& block, int corner, int i) const {
+    const __m256 position = _mm256_load_ps(block.positions[corner][ray_.k[i]]);
+    return _mm256_fmsub_ps(position, scale_, origin_[i]);
+  }
+
+  const core::PreparedRay& ray_;
+  __m256 scale_;
+  __m256 origin_[3];
+  __m256 shear_[2];
+};
+
+}  // namespace zkd::cpu
+#endif
