@@ -25,7 +25,7 @@ class Avx2WideBoxes {
       inverse_[a] = _mm256_set1_ps(ray.inverse[a].value);
       leaving_[a] = _mm256_set1_ps((ray.inverse[a] * ray.far_slack).value);
       padding_[a] = _mm256_set1_ps(ray.padding[a].value);
-      near_[a] = ray.is_negative(a) ? 1 : 0;
+      near_[a] = ray.is_negative(a) ? other_side : 0;
     }
   }
 
@@ -33,19 +33,27 @@ class Avx2WideBoxes {
     __m256 near = first_;
     __m256 far = _mm256_set1_ps(last.value);
     for (int a = 0; a < 3; ++a) {
-      const __m256 to_near =
-          _mm256_sub_ps(_mm256_load_ps(node.bounds[a][near_[a]]), origin_[a]);
-      const __m256 to_far =
-          _mm256_sub_ps(_mm256_load_ps(node.bounds[a][1 - near_[a]]), origin_[a]);
+      const char* const bounds = reinterpret_cast<const char*>(node.bounds[a]);
+      const __m256 to_near = _mm256_sub_ps(load(bounds + near_[a]), origin_[a]);
+      const __m256 to_far = _mm256_sub_ps(load(bounds + (near_[a] ^ other_side)), origin_[a]);
       near = _mm256_max_ps(near, _mm256_fmsub_ps(to_near, inverse_[a], padding_[a]));
       far = _mm256_min_ps(far, _mm256_fmadd_ps(to_far, leaving_[a], padding_[a]));
     }
-    _mm256_store_ps(entries.t, near);
+    const __m256i bits = _mm256_castps_si256(near);
+    const __m256i flipped =
+        _mm256_and_si256(_mm256_srai_epi32(bits, 31), _mm256_set1_epi32(0x7FFFFFFF));
+    _mm256_store_si256(reinterpret_cast<__m256i*>(entries.t), _mm256_xor_si256(bits, flipped));
     entries.hit =
         static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(near, far, _CMP_LE_OQ)));
   }
 
  private:
+  static constexpr std::size_t other_side = sizeof(WideNode::bounds[0][0]);
+
+  ZKD_CPU_AVX2 static __m256 load(const char* bounds) {
+    return _mm256_load_ps(reinterpret_cast<const float*>(bounds));
+  }
+
   __m256 first_;
   __m256 origin_[3];
   __m256 inverse_[3];

@@ -14,12 +14,22 @@
 namespace zkd::cpu {
 namespace {
 
+/// What decides of the triangles that the filter left over: it is not asked twice.
+template <class Intersect>
+struct AfterFilter {
+  using type = Intersect;
+};
+template <>
+struct AfterFilter<core::Watertight> {
+  using type = core::DoublePrecision;
+};
+
 template <bool any, class Boxes, class Lanes, class Intersect>
 inline typename Intersect::Candidate trace(const WideTreeView& tree, const Ray& ray,
                                            TraversalCost* cost) {
   const core::PreparedRay prepared(TreeView{tree.header}, ray, Intersect::hit_distance);
   if (prepared.valid) {
-    const Intersect intersect(prepared, ray);
+    const typename AfterFilter<Intersect>::type intersect(prepared, ray);
     return walk<any, Boxes, Lanes>(tree, prepared, intersect, cost);
   }
   if (cost != nullptr) *cost = {};

@@ -17,11 +17,72 @@
 
 namespace zkd::cpu {
 
-/// Where a ray enters the boxes of a node, and bit i: it meets box i.
+/// A float as an integer of the same order. (Of the two zeros -0 is the lesser.)
+inline std::int32_t ordered(float x) {
+  const auto bits = std::bit_cast<std::int32_t>(x);
+  return bits ^ ((bits >> 31) & 0x7FFFFFFF);
+}
+
+/// Where a ray enters the boxes of a node, as ordered(), and bit i: it meets box i.
 struct WideEntries {
-  alignas(32) float t[wide];
+  alignas(32) std::int32_t t[wide];
   std::uint32_t hit;
 };
+
+/// A child that waits: where it is entered, then its link, in one number to be sorted by.
+using Waiting = std::int64_t;
+inline Waiting waiting_for(std::int32_t t, Link link) {
+  return static_cast<Waiting>(static_cast<std::uint64_t>(static_cast<std::uint32_t>(t)) << 32 |
+                              link.bits);
+}
+inline std::int32_t entry_of(Waiting child) { return static_cast<std::int32_t>(child >> 32); }
+inline Link link_of(Waiting child) { return Link{static_cast<std::uint32_t>(child)}; }
+
+/// Puts the nearer one behind: without a branch, since nobody could foretell it.
+inline void order(Waiting& further, Waiting& nearer) {
+  const Waiting a = further;
+  const Waiting b = nearer;
+  further = a < b ? b : a;
+  nearer = a < b ? a : b;
+}
+
+/// Takes the next of the children that are hit.
+inline Waiting take(const WideNode& node, const WideEntries& entries, std::uint32_t& hit) {
+  const auto i = static_cast<std::uint32_t>(std::countr_zero(hit));
+  hit &= hit - 1;
+  return waiting_for(entries.t[i], node.child[i]);
+}
+
+/// Puts the children that are hit, two at least, on the stack, and returns the nearest instead.
+inline Link put(const WideNode& node, const WideEntries& entries, Waiting*& top) {
+  std::uint32_t hit = entries.hit;
+  Waiting a = take(node, entries, hit);
+  Waiting b = take(node, entries, hit);
+  order(a, b);
+  if (hit == 0) {
+    *top++ = a;
+    return link_of(b);
+  }
+  Waiting c = take(node, entries, hit);
+  order(a, c);
+  order(b, c);
+  if (hit == 0) {
+    *top++ = a;
+    *top++ = b;
+    return link_of(c);
+  }
+  Waiting* const begin = top;
+  *top++ = a;
+  *top++ = b;
+  do {  // c is the nearest so far
+    Waiting d = take(node, entries, hit);
+    order(d, c);
+    Waiting* place = top++;
+    for (; place > begin && place[-1] < d; --place) *place = place[-1];
+    *place = d;
+  } while (hit != 0);
+  return link_of(c);
+}
 
 /// Walks the tree. With `any`, stops at the first hit.
 ///
@@ -32,17 +93,14 @@ inline typename Intersect::Candidate walk(const WideTreeView& tree, const core::
                                           const Intersect& intersect, TraversalCost* cost) {
   const Boxes boxes(ray);
   const Lanes lanes(ray);
-  struct Waiting {  // without initialisers: a stack of them costs nothing
-    std::uint32_t link;
-    float t;
-  };
   Waiting stack[std::size_t{max_depth} * (wide - 1) + wide];
-  std::uint32_t waiting = 0;
+  Waiting* top = stack;
   typename Intersect::Candidate best;
   Link link = tree.root();
   std::uint32_t node_visits = 0;
   std::uint32_t triangle_tests = 0;
   core::Real last = core::smaller(ray.last, best.limit);
+  std::int32_t limit = ordered(best.limit.value);
 
   for (;;) {
     bool reached = true;
@@ -51,32 +109,14 @@ inline typename Intersect::Candidate walk(const WideTreeView& tree, const core::
       const WideNode& node = tree.nodes[link.index()];
       WideEntries entries;
       boxes(node, last, entries);
-      std::uint32_t hit = entries.hit;
-      if (hit == 0) {
+      if (entries.hit == 0) {
         reached = false;
         break;
       }
-      auto near = static_cast<std::uint32_t>(std::countr_zero(hit));
-      hit &= hit - 1;
-      if (hit != 0) {
-        // The nearest is kept in hand; the others are sorted in, the furthest first.
-        Waiting* const begin = stack + waiting;
-        Waiting* end = begin;
-        Waiting nearest{node.child[near].bits, entries.t[near]};
-        do {
-          const auto i = static_cast<std::uint32_t>(std::countr_zero(hit));
-          hit &= hit - 1;
-          Waiting next{node.child[i].bits, entries.t[i]};
-          if (next.t < nearest.t) std::swap(next, nearest);
-          Waiting* place = end++;
-          for (; place > begin && place[-1].t < next.t; --place) *place = place[-1];
-          *place = next;
-        } while (hit != 0);
-        waiting = static_cast<std::uint32_t>(end - stack);
-        link = Link{nearest.link};
-      } else {
-        link = node.child[near];
-      }
+      if ((entries.hit & (entries.hit - 1)) == 0)
+        link = node.child[std::countr_zero(entries.hit)];
+      else
+        link = put(node, entries, top);
     }
     if (reached) {
       const TriangleBlock* block = tree.blocks + link.index();
@@ -98,21 +138,22 @@ inline typename Intersect::Candidate walk(const WideTreeView& tree, const core::
           }
         }
         if (done) {
-          waiting = 0;
+          top = stack;
           break;
         }
         if (block->is_last()) break;
       }
       last = core::smaller(ray.last, best.limit);
+      limit = ordered(best.limit.value);
     }
     // As in traverse(): what waits behind the best hit is passed over.
     do {
-      if (waiting == 0) {
+      if (top == stack) {
         if (cost != nullptr) *cost = {node_visits, triangle_tests};
         return best;
       }
-      link = Link{stack[--waiting].link};
-    } while (stack[waiting].t > best.limit.value);
+      link = link_of(*--top);
+    } while (entry_of(*top) > limit);
   }
 }
 
