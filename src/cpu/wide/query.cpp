@@ -4,38 +4,49 @@
 #include <algorithm>
 
 #include <zkd/cpu/wide_tree.hpp>
-#include <zkd/traversal/intersect.hpp>
+#include <zkd/traversal/ray.hpp>
 
 #include "cpu/float_environment.hpp"
+#include "cpu/instruction_set.hpp"
 #include "cpu/rays.hpp"
+#include "cpu/threads.hpp"
 #include "cpu/wide/avx2.hpp"
+#include "cpu/wide/portable.hpp"
 #include "cpu/wide/walk.hpp"
 
 namespace zkd::cpu {
 namespace {
 
-/// What decides of the triangles that the filter left over: it is not asked twice.
-template <class Intersect>
-struct AfterFilter {
-  using type = Intersect;
-};
-template <>
-struct AfterFilter<core::Watertight> {
-  using type = core::DoublePrecision;
-};
-
-template <bool any, class Boxes, class Lanes, class Intersect>
-inline typename Intersect::Candidate trace(const WideTreeView& tree, const Ray& ray,
-                                           TraversalCost* cost) {
+template <bool any, class Instructions, class Intersect>
+inline auto trace(const WideTreeView& tree, const Ray& ray, TraversalCost* cost) {
+  using Decide = typename Instructions::template Decide<Intersect>;
+  using Lanes = typename Instructions::template Lanes<Intersect>;
   const core::PreparedRay prepared(TreeView{tree.header}, ray, Intersect::hit_distance);
   if (prepared.valid) {
-    const typename AfterFilter<Intersect>::type intersect(prepared, ray);
-    return walk<any, Boxes, Lanes>(tree, prepared, intersect, cost);
+    const Decide intersect(prepared, ray);
+    return walk<any, typename Instructions::Boxes, Lanes>(tree, prepared, intersect, cost);
   }
   if (cost != nullptr) *cost = {};
-  return {};
+  return typename Decide::Candidate{};
 }
 
+/// read(candidate) of the walk of one ray.
+template <bool any, class Read>
+auto trace_one(const WideTreeView& tree, const Ray& ray, Intersector intersector,
+               Read read) noexcept {
+  const FloatEnvironment environment;
+  return with_intersector(intersector, [&]<class Intersect>() {
+    if (use_avx2(InstructionSet::automatic)) {
+      const auto body = [&](const Ray& one) {
+        return read(trace<any, Avx2Wide, Intersect>(tree, one, nullptr));
+      };
+      return call_avx2(body, ray);
+    }
+    return read(trace<any, PortableWide, Intersect>(tree, ray, nullptr));
+  });
+}
+
+/// write(i, candidate) for the walk of every ray i.
 template <bool any, class Write>
 void trace_all(const Executor& executor, const WideTreeView& tree, std::span<const Ray> rays,
                std::size_t count, std::span<TraversalCost> costs, Intersector intersector,
@@ -43,14 +54,32 @@ void trace_all(const Executor& executor, const WideTreeView& tree, std::span<con
   if (!costs.empty()) count = std::min(count, costs.size());
   const Threads threads(executor);
   with_intersector(intersector, [&]<class Intersect>() {
-    for_each_ray(threads, count, rays_at_once, [=](std::size_t i) {
-      write(i, trace<any, Avx2WideBoxes, Avx2Lanes, Intersect>(
-                   tree, rays[i], costs.empty() ? nullptr : &costs[i]));
-    });
+    const auto trace_with = [=]<class Instructions>(std::size_t i) {
+      write(i, trace<any, Instructions, Intersect>(tree, rays[i],
+                                                   costs.empty() ? nullptr : &costs[i]));
+    };
+    if (threads.avx2())
+      for_each_ray(threads, count, rays_at_once,
+                   [=](std::size_t i) { trace_with.template operator()<Avx2Wide>(i); });
+    else
+      for_each_ray(threads, count, rays_at_once,
+                   [=](std::size_t i) { trace_with.template operator()<PortableWide>(i); });
   });
 }
 
 }  // namespace
+
+std::optional<Hit> closest_hit(const WideTreeView& tree, const Ray& ray,
+                               Intersector intersector) noexcept {
+  const Hit hit = trace_one<false>(tree, ray, intersector,
+                                   [](const auto& found) { return core::to_hit(found); });
+  if (hit.triangle == no_triangle) return std::nullopt;
+  return hit;
+}
+
+bool any_hit(const WideTreeView& tree, const Ray& ray, Intersector intersector) noexcept {
+  return trace_one<true>(tree, ray, intersector, [](const auto& found) { return found.found(); });
+}
 
 void closest_hit(const Executor& executor, const WideTreeView& tree, std::span<const Ray> rays,
                  std::span<Hit> hits, std::span<TraversalCost> costs,
