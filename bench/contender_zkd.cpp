@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include <zkd/build.hpp>
+#include <zkd/cpu/wide_tree.hpp>
 
 #include "memory.hpp"
 
@@ -15,13 +16,18 @@ namespace {
 class CpuContender final : public ZkdContender {
  public:
   CpuContender(const cpu::Executor& executor, const TriangleView& triangles,
-               const BuildOptions& options, Intersector intersector)
-      : executor_(executor), triangles_(triangles), options_(options), intersector_(intersector) {}
+               const BuildOptions& options, Intersector intersector, Layout layout)
+      : executor_(executor),
+        triangles_(triangles),
+        options_(options),
+        intersector_(intersector),
+        layout_(layout) {}
 
   double build() override {
     clear();
     const Stopwatch watch;
     tree_ = zkd::build(executor_, triangles_, options_);
+    if (layout_ == Layout::wide) wide_ = cpu::widen(executor_, tree_.view(), triangles_);
     return watch.ms();
   }
 
@@ -39,7 +45,10 @@ class CpuContender final : public ZkdContender {
     return timing;
   }
 
-  void clear() override { tree_ = Tree(); }
+  void clear() override {
+    tree_ = Tree();
+    wide_ = cpu::WideTree();
+  }
 
   // Bytes, in a build whose memory is counted. `once` can be asked for beforehand; for `all` the
   // question is put with the number of references that it turned out to have; `sah` cannot tell.
@@ -48,9 +57,12 @@ class CpuContender final : public ZkdContender {
     cpu::Executor counted = executor_;
     counted.memory = &memory;
     const Tree tree = zkd::build(counted, triangles_, options_);
-    result.allocated.tree = memory.held();
-    result.allocated.workspace = memory.peak() - memory.held();
-    if (options_.builder == Builder::morton) {
+    const cpu::WideTree wide =
+        layout_ == Layout::wide ? cpu::widen(counted, tree.view(), triangles_) : cpu::WideTree();
+    // Rays need one of the two.
+    result.allocated.tree = layout_ == Layout::wide ? wide.bytes() : memory.held();
+    result.allocated.workspace = memory.peak() - result.allocated.tree;
+    if (options_.builder == Builder::morton && layout_ == Layout::binary) {
       const std::uint64_t references =
           options_.references == References::once ? 0 : tree.view().reference_count();
       const MemoryRequirement asked =
@@ -58,6 +70,7 @@ class CpuContender final : public ZkdContender {
       result.allocated.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;
     }
     result.options = tree.options();
+    result.layout = layout_;
     result.options.backend = Backend::cpu;  // an executor was given, so the option stays as asked
   }
 
@@ -71,13 +84,19 @@ class CpuContender final : public ZkdContender {
   double closest_hit(std::span<const Ray> rays, std::span<Hit> hits,
                      std::span<TraversalCost> costs) override {
     const Stopwatch watch;
-    zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits, costs, intersector_);
+    if (layout_ == Layout::wide)
+      cpu::closest_hit(executor_, wide_.view(), rays, hits, costs, intersector_);
+    else
+      zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits, costs, intersector_);
     return watch.ms();
   }
   double any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                  std::span<TraversalCost> costs) override {
     const Stopwatch watch;
-    zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded, costs, intersector_);
+    if (layout_ == Layout::wide)
+      cpu::any_hit(executor_, wide_.view(), rays, occluded, costs, intersector_);
+    else
+      zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded, costs, intersector_);
     return watch.ms();
   }
 
@@ -88,7 +107,9 @@ class CpuContender final : public ZkdContender {
   TriangleView triangles_;
   BuildOptions options_;
   Intersector intersector_;
+  Layout layout_;
   Tree tree_;
+  cpu::WideTree wide_;  ///< of Layout::wide
   std::vector<Hit> hits_;
   std::vector<std::uint8_t> occluded_;
 };
@@ -97,8 +118,9 @@ class CpuContender final : public ZkdContender {
 
 std::unique_ptr<ZkdContender> cpu_contender(const cpu::Executor& executor,
                                             const TriangleView& triangles,
-                                            const BuildOptions& options, Intersector intersector) {
-  return std::make_unique<CpuContender>(executor, triangles, options, intersector);
+                                            const BuildOptions& options, Intersector intersector,
+                                            Layout layout) {
+  return std::make_unique<CpuContender>(executor, triangles, options, intersector, layout);
 }
 
 }  // namespace zkd::bench

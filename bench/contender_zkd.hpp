@@ -42,10 +42,11 @@ class ZkdContender : public Contender {
   [[nodiscard]] virtual const Tree& tree() = 0;
 };
 
-/// zkd on the CPU. `triangles` must outlive it.
+/// zkd on the CPU. With Layout::wide, builds end with a wide tree and rays go through that.
+/// `triangles` must outlive it.
 [[nodiscard]] std::unique_ptr<ZkdContender> cpu_contender(const cpu::Executor& executor,
                                                           const TriangleView& triangles,
                                                           const BuildOptions& options,
-                                                          Intersector intersector);
+                                                          Intersector intersector, Layout layout);
 
 }  // namespace zkd::bench

@@ -93,6 +93,7 @@ Json json_of_options(const Result& result) {
           {"sah_empty_bonus", shortest(options.sah.empty_bonus)},
           {"instructions", result.instructions},
           {"intersector", result.intersector},
+          {"layout", to_string(result.layout)},
           {"seed", result.seed}};
 }
 

@@ -87,6 +87,10 @@ int run(const Options& options) {
   if (options.images && !scene::can_write_png()) {
     throw UsageError("--images: this zkd-bench was built without OpenImageIO");
   }
+  if (where.backend == Backend::cuda &&
+      std::count(options.layouts.begin(), options.layouts.end(), Layout::wide) > 0) {
+    throw UsageError("--layout: wide is for the CPU; add --backend cpu");
+  }
   const bool json_only = options.json && *options.json == "-";
   make_image_folder(options);
 

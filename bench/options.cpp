@@ -29,6 +29,7 @@ constexpr std::array all_invalid{InvalidTriangles::error, InvalidTriangles::skip
 constexpr std::array all_ray_kinds{RayKind::primary, RayKind::diffuse, RayKind::shadow};
 constexpr std::array all_instructions{cpu::InstructionSet::automatic, cpu::InstructionSet::portable,
                                       cpu::InstructionSet::avx2};
+constexpr std::array all_layouts{Layout::binary, Layout::wide};
 constexpr std::array all_peers{PeerLibrary::embree};
 
 const char* on_off(bool value) { return value ? "on" : "off"; }
@@ -40,7 +41,8 @@ bool on_or_off(const std::string& option, const std::string& value) {
 }
 
 // What distinguishes a setting: its values on the options that were given more than one.
-std::string label_of(const BuildOptions& setting, bool builders, bool qualities, bool references) {
+std::string label_of(const BuildOptions& setting, Layout layout, bool builders, bool qualities,
+                     bool references, bool layouts) {
   std::string label;
   const auto add = [&](bool varies, const char* name) {
     if (!varies) return;
@@ -50,12 +52,15 @@ std::string label_of(const BuildOptions& setting, bool builders, bool qualities,
   add(builders, zkd::to_string(setting.builder));
   add(qualities, zkd::to_string(setting.quality));
   add(references, zkd::to_string(setting.references));
+  add(layouts, to_string(layout));
   return label;
 }
 
 }  // namespace
 
 const char* to_string(PeerLibrary) noexcept { return "embree"; }
+
+const char* to_string(Layout layout) noexcept { return layout == Layout::wide ? "wide" : "binary"; }
 
 std::vector<std::string> flags_of(const BuildOptions& options) {
   return {"--builder",
@@ -103,6 +108,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   std::string measure_quality = "on";
   std::string instructions = to_string(options.instructions);
   std::string intersector = zkd::to_string(options.intersector);
+  std::string layout = to_string(Layout::binary);
   std::string rays = names_of(all_ray_kinds, ",");
   std::string peers;
   double budget = static_cast<double>(defaults.budget);
@@ -172,6 +178,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
 
   const char* measure = "Measure";
   text(measure, "--intersector", intersector, "How: " + names_of(all_intersectors, ", "), "HOW");
+  text(measure, "--layout", layout,
+       "List of " + names_of(all_layouts, ", ") + ": what rays go through on the CPU", "LIST");
   text(measure, "--rays", rays, "List of " + names_of(all_ray_kinds, ", "), "LIST");
   number(measure, "--size", size, "N x N primary rays", 1, 16384);
   number(measure, "--seed", seed, "Of bounces and light samples", 0,
@@ -224,18 +232,23 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   const auto builders = values_listed(all_builders, "--builder", builder);
   const auto qualities = values_listed(all_qualities, "--quality", quality);
   const auto policies = values_listed(all_references, "--references", references);
+  const auto layouts = values_listed(all_layouts, "--layout", layout);
   for (const Builder one_builder : builders) {
     for (const Quality one_quality : qualities) {
       for (const References one_policy : policies) {
         // sah knows one policy only.
         if (one_builder == Builder::sah && one_policy != policies.front()) continue;
-        BuildOptions setting = base;
-        setting.builder = one_builder;
-        setting.quality = one_quality;
-        setting.references = one_policy;
-        options.settings.push_back(setting);
-        options.labels.push_back(
-            label_of(setting, builders.size() > 1, qualities.size() > 1, policies.size() > 1));
+        for (const Layout one_layout : layouts) {
+          BuildOptions setting = base;
+          setting.builder = one_builder;
+          setting.quality = one_quality;
+          setting.references = one_policy;
+          options.settings.push_back(setting);
+          options.layouts.push_back(one_layout);
+          options.labels.push_back(label_of(setting, one_layout, builders.size() > 1,
+                                            qualities.size() > 1, policies.size() > 1,
+                                            layouts.size() > 1));
+        }
       }
     }
   }

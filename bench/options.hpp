@@ -28,6 +28,7 @@ struct Options {
   std::vector<std::string> scenes;  ///< names or files; empty: the scenes of the paper
 
   std::vector<BuildOptions> settings;  ///< every combination of the lists given; at least one
+  std::vector<Layout> layouts;         ///< for each setting, what rays are traced through
   std::vector<std::string> labels;     ///< for each setting, what tells it from the others
 
   int threads = 0;  ///< 0: all

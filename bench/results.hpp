@@ -25,6 +25,13 @@ enum class RayKind : std::uint8_t { primary, diffuse, shadow };
 /// "primary", "diffuse", "shadow". Static storage.
 [[nodiscard]] const char* to_string(RayKind kind) noexcept;
 
+/// What rays are traced through: the tree as it was built, or, on the CPU, the form that
+/// cpu::widen makes of it. Making that is a part of the time of a build.
+enum class Layout : std::uint8_t { binary, wide };
+
+/// "binary", "wide". Static storage.
+[[nodiscard]] const char* to_string(Layout layout) noexcept;
+
 /// Repetitions of one measurement, milliseconds.
 struct Spread {
   double median = 0.0;
@@ -119,6 +126,7 @@ struct Result {
   BuildOptions options;  ///< as used, after automatic
   std::string instructions;
   std::string intersector;
+  Layout layout = Layout::binary;
   std::uint64_t seed = 0;
   Spread build_ms;
   std::vector<Spread> stages_ms;  ///< one for each Stage, in order

@@ -205,8 +205,9 @@ std::vector<std::unique_ptr<ZkdContender>> our_contenders(const Options& options
   if (backend == Backend::cuda)
     return cuda_contenders(triangles, options.settings, options.intersector);
   std::vector<std::unique_ptr<ZkdContender>> contenders;
-  for (const BuildOptions& setting : options.settings) {
-    contenders.push_back(cpu_contender(executor, triangles, setting, options.intersector));
+  for (std::size_t i = 0; i < options.settings.size(); ++i) {
+    contenders.push_back(cpu_contender(executor, triangles, options.settings[i],
+                                       options.intersector, options.layouts[i]));
   }
   return contenders;
 }

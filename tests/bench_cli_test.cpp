@@ -219,7 +219,7 @@ TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
         result["options"],
         {"builder", "quality", "references", "budget", "leaf_size", "code_bits", "axis_order",
          "recode", "invalid", "reference_capacity", "sah_areas", "sah_visit_cost", "sah_test_cost",
-         "sah_empty_bonus", "instructions", "intersector", "seed"});
+         "sah_empty_bonus", "instructions", "intersector", "layout", "seed"});
     expect_spread(result["build_ms"], 2);
     expect_keys(result["stages_ms"], {"validate", "encode", "sort", "references", "tight_boxes"});
     expect_keys(result["allocated_bytes"], {"tree", "workspace", "asked_beforehand"});

@@ -68,8 +68,8 @@ class Avx2WideBoxes {
   std::size_t near_[3];
 };
 
-/// The triangles of a block that the ray may hit, by single precision: core::surely_misses of all of
-/// them, with what the intersector's answers need besides ("Wide trees" in docs/accuracy.md).
+/// The triangles of a block that the ray may hit, by single precision: core::surely_misses of all
+/// of them, with what the intersector's answers need besides ("Wide trees" in docs/accuracy.md).
 template <class Intersect>
 class Avx2Lanes {
  public:
@@ -128,9 +128,9 @@ class Avx2Lanes {
     const __m256 least = _mm256_min_ps(w0, _mm256_min_ps(w1, w2));
     const __m256 most = _mm256_max_ps(w0, _mm256_max_ps(w1, w2));
     // Ordered comparisons: where there is no triangle all is NaN.
-    const __m256 may = _mm256_or_ps(
-        _mm256_cmp_ps(least, _mm256_sub_ps(_mm256_setzero_ps(), bound), _CMP_GE_OQ),
-        _mm256_cmp_ps(most, bound, _CMP_LE_OQ));
+    const __m256 may =
+        _mm256_or_ps(_mm256_cmp_ps(least, _mm256_sub_ps(_mm256_setzero_ps(), bound), _CMP_GE_OQ),
+                     _mm256_cmp_ps(most, bound, _CMP_LE_OQ));
     return static_cast<std::uint32_t>(_mm256_movemask_ps(may));
   }
 
@@ -149,9 +149,8 @@ class Avx2Lanes {
       }
     }
     [[nodiscard]] ZKD_CPU_AVX2 __m256 longest() const {
-      return _mm256_max_ps(
-          _mm256_sub_ps(hi[0], lo[0]),
-          _mm256_max_ps(_mm256_sub_ps(hi[1], lo[1]), _mm256_sub_ps(hi[2], lo[2])));
+      return _mm256_max_ps(_mm256_sub_ps(hi[0], lo[0]),
+                           _mm256_max_ps(_mm256_sub_ps(hi[1], lo[1]), _mm256_sub_ps(hi[2], lo[2])));
     }
   };
 

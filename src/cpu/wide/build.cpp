@@ -97,7 +97,8 @@ std::uint32_t blocks_for(std::uint32_t references) { return (references + wide -
 
 class Layout {
  public:
-  Layout(const TreeView& tree, const TriangleView& triangles) : tree_(tree), triangles_(triangles) {}
+  Layout(const TreeView& tree, const TriangleView& triangles)
+      : tree_(tree), triangles_(triangles) {}
 
   void write_to(WideNode* nodes, TriangleBlock* blocks) {
     nodes_ = nodes;
@@ -197,11 +198,9 @@ class Layout {
       const bool used = lane < count;
       block.ids[lane] = used ? ids[lane] : TriangleBlock::unused;
       for (int corner = 0; corner < 3; ++corner) {
-        const float* p =
-            used ? triangles_.position(triangles_.index(ids[lane], corner)) : nullptr;
+        const float* p = used ? triangles_.position(triangles_.index(ids[lane], corner)) : nullptr;
         for (int a = 0; a < 3; ++a)
-          block.positions[corner][a][lane] =
-              used ? p[a] : std::numeric_limits<float>::quiet_NaN();
+          block.positions[corner][a][lane] = used ? p[a] : std::numeric_limits<float>::quiet_NaN();
       }
     }
   }

@@ -30,8 +30,8 @@ class PortableWideBoxes {
         const core::Real to_near = core::Real(node.bounds[a][side][i]) - ray_.origin[a];
         const core::Real to_far = core::Real(node.bounds[a][1 - side][i]) - ray_.origin[a];
         near[i] = core::larger(near[i], to_near * ray_.inverse[a] - ray_.padding[a]);
-        far[i] = core::smaller(
-            far[i], (to_far * ray_.inverse[a] + ray_.padding[a]) * ray_.far_slack);
+        far[i] =
+            core::smaller(far[i], (to_far * ray_.inverse[a] + ray_.padding[a]) * ray_.far_slack);
       }
     }
     entries.hit = 0;
