@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include <zkd/build.hpp>
+#include <zkd/cpu/wide_tree.hpp>
 #include <zkd/query.hpp>
 
 #include "choices.hpp"
@@ -60,6 +61,7 @@ std::string describe(const std::string& mesh, std::uint64_t case_number,
 struct CaseResult {
   std::size_t intersector;  // which of all_intersectors
   TreeAgainstLoop counts;
+  TreeAgainstLoop wide_counts;
   TreeAgainstLoop cuda_counts;
   std::string first_difference;
 };
@@ -103,10 +105,14 @@ CaseResult compare_case(std::uint64_t number, std::uint64_t seed, bool cuda) {
   zkd::closest_hit_brute_force(executor, tree.view(), triangles, rays, by_loop, intersector);
   zkd::any_hit(executor, tree.view(), triangles, rays, occluded, {}, intersector);
 
-  CaseResult result{intersector_of(number), {}, {}, {}};
+  CaseResult result{intersector_of(number), {}, {}, {}, {}};
   const std::string what =
       std::string(zkd::to_string(intersector)) + " on " + describe(named.name, number, options);
   result.counts = compare(by_tree, occluded, by_loop, what, result.first_difference);
+  const cpu::WideTree wide = cpu::widen(executor, tree.view(), triangles);
+  cpu::closest_hit(executor, wide.view(), rays, by_tree, {}, intersector);
+  cpu::any_hit(executor, wide.view(), rays, occluded, {}, intersector);
+  result.wide_counts = compare(by_tree, occluded, by_loop, "wide " + what, result.first_difference);
   if (cuda && intersector != Intersector::exact && !tree.view().empty()) {
     // The loop is the host's: the device has to come to its bits.
     const auto contender =
@@ -145,8 +151,8 @@ std::uint64_t TreeAgainstLoops::different() const {
 TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed, int threads,
                                           bool cuda) {
   TreeAgainstLoops all;
-  for (const std::string prefix : {"", "cuda "}) {
-    if (!prefix.empty() && !cuda) break;
+  for (const std::string prefix : {"", "wide ", "cuda "}) {
+    if (prefix == "cuda " && !cuda) break;
     for (const Intersector intersector : all_intersectors) {
       all.of_intersector.push_back({prefix + zkd::to_string(intersector)});
     }
@@ -160,8 +166,9 @@ TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed
 #pragma omp critical(zkd_accuracy_brute_force)
     {
       all.of_intersector[result.intersector] += result.counts;
+      all.of_intersector[all_intersectors.size() + result.intersector] += result.wide_counts;
       if (cuda)
-        all.of_intersector[all_intersectors.size() + result.intersector] += result.cuda_counts;
+        all.of_intersector[2 * all_intersectors.size() + result.intersector] += result.cuda_counts;
       if (!result.first_difference.empty() && number < first_case) {
         first_case = number;
         all.first_difference = result.first_difference;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <zkd/build.hpp>
+#include <zkd/cpu/wide_tree.hpp>
 #include <zkd/query.hpp>
 
 #include "scene/generate.hpp"
@@ -162,6 +163,18 @@ void check_brute_force(const Case& which, const Tree& tree, std::span<const Ray>
   compare(answers, want, some, "not brute force's", findings);
   const std::span<const Ray> fewer = std::span(some).first((some.size() + 2) / 3);
   check_rounding_intersectors(which, tree, fewer, answers, executor, findings);
+}
+
+// The wide form of a tree has its answers.
+void check_wide(const TreeView& tree, const TriangleView& triangles, std::span<const Ray> rays,
+                std::span<const Hit> hits, const cpu::Executor& executor, Findings& findings) {
+  const cpu::WideTree wide = cpu::widen(executor, tree, triangles);
+  std::vector<Hit> others(rays.size());
+  cpu::closest_hit(executor, wide.view(), rays, others);
+  compare(others, hits, rays, "another answer through the wide tree", findings);
+  std::vector<std::uint8_t> occluded(rays.size());
+  cpu::any_hit(executor, wide.view(), rays, occluded);
+  compare_any(occluded, hits, rays, findings);
 }
 
 void check_oracle(const Case& which, const Tree& tree, std::span<const Ray> rays,
@@ -317,6 +330,7 @@ void run_traced(const Case& which, const Setting& setting, Findings& findings) {
       compare(others, hits, rays, "another answer than through the first tree", findings);
     }
     compare_any(occluded, hits, rays, findings);
+    check_wide(tree, triangles, rays, hits, executor, findings);
   }
   findings.about(which.name);
   if (!rays.empty()) {

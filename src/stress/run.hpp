@@ -13,11 +13,11 @@ namespace zkd::stress {
 /// Runs one case. Of every tree: the properties of verify/properties.hpp; the same hash for 1, 2
 /// and 3 threads and for permuted triangles; no more memory than memory_requirement said, all of it
 /// given back. Of every ray through every tree: the answer of a loop over all triangles with the
-/// same intersector, bit by bit; any hit exactly when there is a closest hit; nothing missed,
-/// invented or mistaken outside the band, by the exact oracle; the first hits in order those of a
-/// loop, for a sample. The other intersectors are held to
-/// their loops likewise, and `exact` to the oracle without any band. Of large scenes the loops, the
-/// oracle and permutations see a sample.
+/// same intersector, bit by bit; any hit exactly when there is a closest hit; the same through the
+/// wide form of every tree; nothing missed, invented or mistaken outside the band, by the exact
+/// oracle; the first hits in order those of a loop, for a sample. The other intersectors are held
+/// to their loops likewise, and `exact` to the oracle without any band. Of large scenes the loops,
+/// the oracle and permutations see a sample.
 void run_case(const Case& which, const Setting& setting, Findings& findings);
 
 /// What a row came to.
