@@ -135,26 +135,21 @@ class Layout {
   std::uint32_t leaf(const Part& part, std::uint32_t first) const {
     const std::uint32_t begin = tree_.leaf_offsets[part.begin];
     const std::uint32_t n = tree_.leaf_offsets[part.end] - begin;
+    const bool merged = part.end - part.begin > 1;
+    const std::uint32_t count = merged ? 1 : blocks_for(n);
     if (blocks_ == nullptr) {
       check(begin, n);
-      return blocks_for(n);
+      return count;
     }
-    std::uint32_t ids[wide];
-    std::uint32_t held = 0;
-    std::uint32_t block = first;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const std::uint32_t id = tree_.references[begin + i];
-      // A triangle that several leaves of a part list is one of the part's.
-      if (part.end - part.begin > 1 && std::find(ids, ids + held, id) != ids + held) continue;
-      if (held == wide) {
-        write(blocks_[block++], ids, held);
-        held = 0;
-      }
-      ids[held++] = id;
+    if (merged) {
+      const Children::Triangles triangles(tree_, part);
+      write(blocks_[first], triangles.ids(), triangles.count());
     }
-    write(blocks_[block], ids, held);
-    blocks_[block].ids[0] |= TriangleBlock::last_bit;
-    return blocks_for(n);
+    for (std::uint32_t i = 0; i < n && !merged; i += wide)
+      write(blocks_[first + i / wide], tree_.references + begin + i,
+            std::min<std::uint32_t>(n - i, wide));
+    blocks_[first + count - 1].ids[0] |= TriangleBlock::last_bit;
+    return count;
   }
 
   // Throws where a leaf lists a triangle that there is not.

@@ -4,6 +4,7 @@
 // parts of it are leaves.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include <zkd/cpu/wide_tree.hpp>
@@ -36,12 +37,37 @@ class Children {
   [[nodiscard]] int count() const { return count_; }
   [[nodiscard]] const Part& part(int i) const { return parts_[i]; }
   [[nodiscard]] const Box& box(int i) const { return boxes_[i]; }
-  [[nodiscard]] bool is_leaf(int i) const { return is_leaf(tree_, parts_[i]); }
+  [[nodiscard]] bool is_leaf(int i) const { return leaves_[i]; }
 
-  /// Whether the part is one leaf of the wide tree: one of the tree's, or few enough triangles.
+  /// Whether the part is one leaf of the wide tree: one of the tree's, or so few triangles, however
+  /// often they are referenced, that they are one block.
   static bool is_leaf(const TreeView& tree, const Part& part) {
-    return part.end - part.begin == 1 || references(tree, part) <= static_cast<unsigned>(wide);
+    return part.end - part.begin == 1 || Triangles(tree, part).fit();
   }
+
+  /// The triangles of a part, each once, as long as they fit into a block.
+  class Triangles {
+   public:
+    Triangles(const TreeView& tree, const Part& part) {
+      const std::uint32_t n = references(tree, part);
+      const std::uint32_t* const first = tree.references + tree.leaf_offsets[part.begin];
+      // Not more than a few times as many are looked at.
+      fit_ = n <= 4 * static_cast<std::uint32_t>(wide);
+      for (std::uint32_t i = 0; i < n && fit_; ++i) {
+        if (std::find(ids_, ids_ + count_, first[i]) != ids_ + count_) continue;
+        fit_ = count_ < static_cast<std::uint32_t>(wide);
+        if (fit_) ids_[count_++] = first[i];
+      }
+    }
+    [[nodiscard]] bool fit() const { return fit_; }
+    [[nodiscard]] const std::uint32_t* ids() const { return ids_; }
+    [[nodiscard]] std::uint32_t count() const { return count_; }
+
+   private:
+    bool fit_;
+    std::uint32_t count_ = 0;
+    std::uint32_t ids_[wide];
+  };
 
   static std::uint32_t references(const TreeView& tree, const Part& part) {
     return tree.leaf_offsets[part.end] - tree.leaf_offsets[part.begin];
@@ -59,8 +85,10 @@ class Children {
       for (int i = count_; i > at; --i) {
         parts_[i] = parts_[i - 1];
         boxes_[i] = boxes_[i - 1];
+        leaves_[i] = leaves_[i - 1];
       }
       parts_[at] = halves[which];
+      leaves_[at] = is_leaf(tree_, halves[which]);
       for (int a = 0; a < 3; ++a) {
         boxes_[at].lo[a] = node.lo(which, a);
         boxes_[at].hi[a] = node.hi(which, a);
@@ -75,6 +103,7 @@ class Children {
     for (int i = at; i < count_; ++i) {
       parts_[i] = parts_[i + 1];
       boxes_[i] = boxes_[i + 1];
+      leaves_[i] = leaves_[i + 1];
     }
   }
 
@@ -101,6 +130,7 @@ class Children {
   int count_ = 0;
   Part parts_[wide + 1];
   Box boxes_[wide + 1];
+  bool leaves_[wide + 1];
 };
 
 }  // namespace zkd::cpu
