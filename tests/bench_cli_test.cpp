@@ -288,6 +288,17 @@ TEST_F(BenchCli, EveryBuildOptionIsPassedOnAndRecorded) {
   EXPECT_LE(options["code_bits"], 24);
 }
 
+TEST_F(BenchCli, LayoutsAreMeasuredSideBySide) {
+  const Json json = run_json("tetra.obj --backend cpu --layout binary,wide" + std::string(quick));
+  ASSERT_EQ(json["results"].size(), 2u);
+  EXPECT_EQ(json["results"][0]["options"]["layout"], "binary");
+  EXPECT_EQ(json["results"][1]["options"]["layout"], "wide");
+  EXPECT_EQ(json["results"][0]["trace"]["primary"]["hits"],
+            json["results"][1]["trace"]["primary"]["hits"]);
+  EXPECT_NE(json["results"][0]["allocated_bytes"]["tree"],
+            json["results"][1]["allocated_bytes"]["tree"]);
+}
+
 TEST_F(BenchCli, AnswersAreJudgedByTheBandOfTheirIntersector) {
   if (!can_check()) GTEST_SKIP() << "built without GMP";
   for (const char* name : {"watertight", "fast", "single", "double", "exact"}) {

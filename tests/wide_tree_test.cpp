@@ -87,7 +87,7 @@ void expect_same_answers(const Tree& tree, const WideTree& wide, const TriangleV
 class WideTreeAnswers : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(WideTreeAnswers, AreThoseOfTheTree) {
-  for (std::uint64_t seed = 200; seed < 202; ++seed) {
+  for (std::uint64_t seed = 200; seed < 201; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
     for (const BuildOptions& options : many_options()) {
       SCOPED_TRACE(m.name + ", " + to_string(options.references) + ", leaves of " +
