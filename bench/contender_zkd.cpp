@@ -62,7 +62,7 @@ class CpuContender final : public ZkdContender {
     // Rays need one of the two.
     result.allocated.tree = layout_ == Layout::wide ? wide.bytes() : memory.held();
     result.allocated.workspace = memory.peak() - result.allocated.tree;
-    if (options_.builder == Builder::morton && layout_ == Layout::binary) {
+    if (tree.options().builder == Builder::morton && layout_ == Layout::binary) {
       const std::uint64_t references =
           options_.references == References::once ? 0 : tree.view().reference_count();
       const MemoryRequirement asked =

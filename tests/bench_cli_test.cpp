@@ -111,7 +111,15 @@ TEST_F(BenchCli, BadInputIsOneLineThatNamesTheFile) {
 TEST_F(BenchCli, WhatThisVersionDoesNotBuildIsUsage) {
   expect_error("tetra.obj --references budget", 2, "budget");
   expect_error("tetra.obj --builder wu2011", 2, "wu2011");
-  expect_error("tetra.obj --quality high", 2, "high");
+  expect_error("tetra.obj --quality balanced", 2, "balanced");
+}
+
+TEST_F(BenchCli, QualityHighIsTheSahBuilder) {
+  const Json high = run_json("tetra.obj --quality high" + std::string(quick))["results"][0];
+  const Json sah = run_json("tetra.obj --builder sah" + std::string(quick))["results"][0];
+  EXPECT_EQ(high["options"]["builder"], "sah");
+  EXPECT_EQ(high["options"]["quality"], "high");
+  EXPECT_EQ(high["tree"]["hash"], sah["tree"]["hash"]);
 }
 
 // What --backend cuda says here, if no CUDA device answers.
