@@ -208,10 +208,12 @@ TEST(ApiError, TheSahBuilderOnADevice) {
   const Strip strip(10);
   for (const BuildOptions& options :
        {BuildOptions{.builder = Builder::sah}, BuildOptions{.quality = Quality::high}}) {
-    const Caught error = build_error(strip.view(), options);
-    ASSERT_TRUE(error.thrown);
-    EXPECT_EQ(error.code, ErrorCode::unsupported_option) << error.message;
-    EXPECT_TRUE(names(error, "sah")) << error.message;
+    for (const test::WayToBuild& way : test::ways_to_build()) {
+      const Caught error = caught([&] { (void)way.build(strip.view(), options); });
+      ASSERT_TRUE(error.thrown) << way.name;
+      EXPECT_EQ(error.code, ErrorCode::unsupported_option) << way.name << ": " << error.message;
+      EXPECT_TRUE(names(error, "sah")) << way.name << ": " << error.message;
+    }
   }
 }
 
