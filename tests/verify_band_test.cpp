@@ -7,10 +7,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
 #include <glm/glm.hpp>
+
+#include <zkd/zkd.hpp>
 
 #include "scene/generate.hpp"
 #include "support/meshes.hpp"
@@ -233,6 +236,28 @@ TEST(VerifyBand, UnderflowInTheSmallestScenes) {
     ray.direction = {-std::ldexp(1.0F, -k), 0, 1};
     ASSERT_FALSE(scene.oracle.any_hit(ray));
     expect(scene.verdict(ray, on(0, static_cast<double>(least))), Verdict::phantom, true);
+  }
+}
+
+// A needle beside the ray, which `fast` leaves to double precision. That rounds the last corner's
+// sheared z, 1 - 3 * 2^53, by more than single precision would lose of the needle's few products.
+// Found by fuzzing.
+TEST(VerifyBand, WhatFastAsksDoublePrecision) {
+  const Scene scene(triangles({{0, 0, 0}, {1, 0, 0}, {0x1p+55F, 0, 1}}));
+  const Tree tree = zkd::build(scene.mesh.view());
+  Ray ray;
+  ray.origin = {0x1p+53F, 0, 0};
+  ray.direction = {1, 0.75F, 1};
+  for (const Intersector intersector : {Intersector::double_precision, Intersector::fast}) {
+    const std::optional<Hit> hit = closest_hit(tree.view(), scene.mesh.view(), ray, intersector);
+    ASSERT_TRUE(hit) << to_string(intersector);
+    expect(scene.verdict(ray, *hit, intersector), Verdict::phantom, true);
+  }
+  // Further beside than double precision loses.
+  ray.origin.z = -64;
+  for (const Intersector intersector : {Intersector::double_precision, Intersector::fast}) {
+    EXPECT_FALSE(closest_hit(tree.view(), scene.mesh.view(), ray, intersector));
+    expect(scene.verdict(ray, on(0, 0), intersector), Verdict::phantom, false);
   }
 }
 

@@ -143,6 +143,8 @@ struct Facts {
 
 Facts examine(const Judged& judged, const Corners& corners) {
   const Bounds& bounds = judged.bounds;
+  // What moves the corners whose signs are exact: of `fast`, the double test that it may ask.
+  const Bounds moving = bounds.product == 0.0 ? bounds : bounds_of(Intersector::double_precision);
   const Point& d = judged.d;
   const std::size_t z = judged.z;
   const std::size_t across[2] = {(z + 1) % 3, (z + 2) % 3};
@@ -151,12 +153,12 @@ Facts examine(const Judged& judged, const Corners& corners) {
 
   struct Corner {
     double at[2];     // sheared coordinates
-    double moved[2];  // how far they may be moved
+    double moved[2];  // how far they may be moved for the signs
     double size[3];   // magnitudes from the origin, in the order x, y, z
   };
   Corner corner[3];
-  double furthest = 0.0;  // along z
-  double moved[2] = {0.0, 0.0};
+  double furthest = 0.0;         // along z
+  double moved[2] = {0.0, 0.0};  // of any corner, for t
   for (std::size_t i = 0; i < 3; ++i) {
     Long p[3];
     for (std::size_t a = 0; a < 3; ++a) {
@@ -169,10 +171,13 @@ Facts examine(const Judged& judged, const Corners& corners) {
       const Long sheared = Long{d[across[k]]} / Long{d[z]} * p[z];
       corner[i].at[k] = static_cast<double>(p[across[k]] - sheared);
       corner[i].size[k] = static_cast<double>(std::abs(p[across[k]]));
-      corner[i].moved[k] = bounds.unit * (bounds.corner * corner[i].size[k] +
-                                          bounds.sheared * static_cast<double>(std::abs(sheared))) +
-                           judged.lost;
-      moved[k] = std::max(moved[k], corner[i].moved[k]);
+      const auto by = [&](const Bounds& test) {
+        return test.unit * (test.corner * corner[i].size[k] +
+                            test.sheared * static_cast<double>(std::abs(sheared))) +
+               judged.lost;
+      };
+      corner[i].moved[k] = by(moving);
+      moved[k] = std::max(moved[k], by(bounds));
     }
   }
   // The terms that a product of `fast` is summed from, along the sheared ray.
@@ -200,12 +205,12 @@ Facts examine(const Judged& judged, const Corners& corners) {
     const std::size_t j = (i + 1) % 3;
     const Corner& a = corner[i];
     const Corner& b = corner[j];
-    double band = product_error[i];
-    if (bounds.product == 0.0) {
-      band = a.moved[0] * std::abs(b.at[1]) + std::abs(a.at[0]) * b.moved[1] +
-             a.moved[1] * std::abs(b.at[0]) + std::abs(a.at[1]) * b.moved[0] +
-             a.moved[0] * b.moved[1] + a.moved[1] * b.moved[0];
-    }
+    double band = a.moved[0] * std::abs(b.at[1]) + std::abs(a.at[0]) * b.moved[1] +
+                  a.moved[1] * std::abs(b.at[0]) + std::abs(a.at[1]) * b.moved[0] +
+                  a.moved[0] * b.moved[1] + a.moved[1] * b.moved[0];
+    // `fast` decides in either precision, and neither bound is always the larger: that of double
+    // is, where a triangle lies nearly along an axis and so has small terms.
+    if (bounds.product != 0.0) band = std::max(band, product_error[i]);
     band += judged.underflow;
     // Where no coordinate is rounded there is no excuse.
     const bool flat = bounds.product == 0.0 && a.at[0] == 0.0 && b.at[0] == 0.0 &&

@@ -24,7 +24,7 @@ namespace zkd::verify {
 /// - t is that of the moved triangle to unit * t * max |p_z / d_z|.
 ///
 /// `fast` moves no corners: its signs are off by unit * product times the terms they are summed
-/// from.
+/// from, or, where it asks double precision, are those of that one's moved corners.
 struct Bounds {
   double unit;
   double corner;
