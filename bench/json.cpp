@@ -155,6 +155,10 @@ Json json_of(const Result& result) {
   for (std::size_t i = 0; i < result.stages_ms.size(); ++i) {
     stages[zkd::to_string(static_cast<Stage>(i))] = result.stages_ms[i].median;
   }
+  Json& bytes = json["stages_bytes"] = Json::object();
+  for (std::size_t i = 0; i < statistics.stage_bytes.size(); ++i) {
+    bytes[zkd::to_string(static_cast<Stage>(i))] = or_null(statistics.stage_bytes[i]);
+  }
   json["allocated_bytes"] = {{"tree", result.allocated.tree},
                              {"workspace", result.allocated.workspace},
                              {"asked_beforehand", result.allocated.asked_beforehand}};
@@ -184,11 +188,16 @@ Json json_of(const Result& result) {
   }
 
   Json& skipped = json["skipped"] = Json::array();
-  for (const SkippedWork& work : skipped_work(statistics)) {
+  Json& not_skipped = json["not_skipped"] = Json::array();
+  for (const SkippedWork& work : skips_considered(statistics)) {
+    if (!work.taken) {
+      not_skipped.push_back({{"what", work.what}, {"why", work.why}});
+      continue;
+    }
     skipped.push_back({{"what", work.what},
                        {"amount", unless_empty(work.amount)},
                        {"why", work.why},
-                       {"saved_ms", nullptr}});
+                       {"saved_ms", or_null(work.saved_ms)}});
   }
   Json& peers = json["peers"] = Json::array();
   for (const Peer& peer : result.peers) peers.push_back(json_of(peer));

@@ -8,45 +8,43 @@
 namespace zkd::bench {
 namespace {
 
-struct Words {
-  const char* unit;  // nullptr: the amount says nothing
-  const char* why;
-};
-
-Words words_for(Skip skip) {
+// nullptr: the amount says nothing
+const char* unit_of(Skip skip) {
   switch (skip) {
     case Skip::radix_passes:
-      return {"passes", "every code has the same digit there"};
+      return "passes";
     case Skip::flat_axes:
-      return {"axes", "nothing extends along them"};
+      return "axes";
     case Skip::wide_codes:
-      return {"bits", "few triangles: short codes tell them apart"};
+      return "bits";
     case Skip::recoding:
-      return {nullptr, "no crowded trunk"};
     case Skip::compaction:
-      return {nullptr, "no triangle left out"};
     case Skip::count:
       break;
   }
-  return {nullptr, ""};
+  return nullptr;
 }
 
 }  // namespace
 
-std::vector<SkippedWork> skipped_work(const Statistics& statistics) {
+std::vector<SkippedWork> skips_considered(const Statistics& statistics) {
   std::vector<SkippedWork> list;
   for (std::size_t i = 0; i < statistics.skips.size(); ++i) {
-    if (!statistics.skips[i].taken) continue;
+    const SkipReport& report = statistics.skips[i];
+    if (!report.considered) continue;
     const auto skip = static_cast<Skip>(i);
-    const Words words = words_for(skip);
-    SkippedWork entry;
-    entry.what = to_string(skip);
-    if (words.unit != nullptr) {
-      entry.amount = std::to_string(statistics.skips[i].amount) + " " + words.unit;
-    }
-    entry.why = words.why;
+    SkippedWork entry{
+        to_string(skip), report.taken, {}, reason(skip, report.taken), report.saved_ms};
+    const char* const unit = unit_of(skip);
+    if (report.taken && unit != nullptr) entry.amount = std::to_string(report.amount) + " " + unit;
     list.push_back(entry);
   }
+  return list;
+}
+
+std::vector<SkippedWork> skipped_work(const Statistics& statistics) {
+  std::vector<SkippedWork> list = skips_considered(statistics);
+  std::erase_if(list, [](const SkippedWork& work) { return !work.taken; });
   return list;
 }
 

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <string>
 
+#include "skips.hpp"
+
 namespace zkd::bench {
 namespace {
 
@@ -50,6 +52,29 @@ std::string size_name(std::size_t bin) {
                        : std::to_string(first) + " to " + std::to_string(last);
 }
 
+// What the build took, stage by stage. Times are medians of the timed builds.
+void print_stages(std::ostream& out, const Result& result) {
+  line(out, "  %-20s%12s%12s", "stage", "ms", "MB held");
+  for (std::size_t i = 0; i < result.stages_ms.size(); ++i) {
+    char held[32] = "-";
+    if (const auto bytes = result.statistics.stage_bytes[i])
+      std::snprintf(held, sizeof held, "%.2f", 1e-6 * static_cast<double>(*bytes));
+    line(out, "  %-20s%12.3f%12s", to_string(static_cast<Stage>(i)), result.stages_ms[i].median,
+         held);
+  }
+}
+
+void print_skips(std::ostream& out, const Result& result) {
+  line(out, "  %-20s%12s%12s  %s", "skip", "", "saved ms", "why");
+  for (const SkippedWork& work : skips_considered(result.statistics)) {
+    char saved[32] = "-";
+    if (work.saved_ms) std::snprintf(saved, sizeof saved, "%.3f", *work.saved_ms);
+    const char* const taken = work.taken ? "taken" : "not taken";
+    line(out, "  %-20s%12s%12s  %s", work.what.c_str(),
+         work.amount.empty() ? taken : work.amount.c_str(), saved, work.why.c_str());
+  }
+}
+
 void print_one(std::ostream& out, const Result& result, const TreeStatistics& s) {
   const std::string name = result.scene + (result.setting.empty() ? "" : " " + result.setting);
   const auto ull = [](std::uint64_t value) { return static_cast<unsigned long long>(value); };
@@ -78,6 +103,8 @@ void print_one(std::ostream& out, const Result& result, const TreeStatistics& s)
     if (s.leaves_of_size[bin] > 0) sizes.push_back({size_name(bin), s.leaves_of_size[bin]});
   }
   print_bars(out, "triangles in a leaf", sizes, s.leaves);
+  print_stages(out, result);
+  print_skips(out, result);
 }
 
 }  // namespace

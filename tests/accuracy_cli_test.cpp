@@ -109,9 +109,19 @@ TEST_F(AccuracyCli, JsonHasEveryKeyOfTheSchema) {
   expect_keys(json["e2"], {"rays", "wrong_triangle", "in_band", "benign", "real", "rows"});
   EXPECT_EQ(json["e2"]["wrong_triangle"], 0);
 
-  expect_keys(json["e3"], {"rays", "different", "cases", "rows"});
-  EXPECT_GE(json["e3"]["rays"], 5000);
+  expect_keys(json["e3"], {"rays", "different", "cases", "loop", "rows"});
+  EXPECT_GE(json["e3"]["rays"], 2 * 5000);  // through trees and through wide trees
   EXPECT_EQ(json["e3"]["different"], 0);
+  EXPECT_GT(json["e3"]["loop"]["rays"], 0);
+  expect_rate(json["e3"]["loop"]["different"]);
+  std::set<std::string> met;
+  for (const Json& row : json["e3"]["rows"]) {
+    if (row["rays"] > 0) met.insert(row["name"].get<std::string>());
+  }
+  for (const char* name : {"watertight", "fast", "single", "double", "exact"}) {
+    EXPECT_TRUE(met.contains(name)) << name;
+    EXPECT_TRUE(met.contains(std::string("wide ") + name)) << name;
+  }
 
   expect_keys(json["e4"], {"rays", "t_ulp", "rows"});
   EXPECT_GT(json["e4"]["rays"], 0);
@@ -187,11 +197,13 @@ TEST_F(AccuracyCli, SeedAndThreadsDecideTheRaysAndNothingElseDoes) {
 }
 
 TEST_F(AccuracyCli, SummaryIsTheLastLine) {
-  const Outcome outcome = run("tetra.obj --quick --stress 0 --measures e3 --brute-force 2000");
+  const Outcome outcome =
+      run("tetra.obj --quick --stress 0 --measures e3 --brute-force 2000 --backend cpu");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   const std::size_t last = outcome.out.rfind('\n', outcome.out.size() - 2);
-  EXPECT_EQ(outcome.out.substr(last + 1), "zkd-accuracy: ok, 1 scenes, 2048 rays of ours\n");
+  // Eight trees with 256 rays each, which their wide forms answer too.
+  EXPECT_EQ(outcome.out.substr(last + 1), "zkd-accuracy: ok, 1 scenes, 4096 rays of ours\n");
 }
 
 TEST_F(AccuracyCli, TableGoesBetweenTheMarkers) {

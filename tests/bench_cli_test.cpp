@@ -259,6 +259,13 @@ TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
     EXPECT_TRUE(result["peers"].empty());
     for (const Json& skipped : result["skipped"]) {
       expect_keys(skipped, {"what", "why", "saved_ms"});
+      EXPECT_FALSE(skipped["why"].get<std::string>().empty());
+    }
+    for (const Json& not_skipped : result["not_skipped"]) expect_keys(not_skipped, {"what", "why"});
+    EXPECT_EQ(result["skipped"].size() + result["not_skipped"].size(), 5u);
+    ASSERT_EQ(result["stages_bytes"].size(), result["stages_ms"].size());
+    for (const auto& [stage, bytes] : result["stages_bytes"].items()) {
+      EXPECT_GT(bytes.get<std::uint64_t>(), 0u) << stage;
     }
   }
 }
@@ -325,6 +332,8 @@ TEST_F(BenchCli, StatsAreShownOnRequest) {
   const Outcome shown = run("tetra.obj --stats" + std::string(quick));
   EXPECT_NE(shown.out.find("Tree of tetra"), std::string::npos);
   EXPECT_NE(shown.out.find("triangles in a leaf"), std::string::npos);
+  EXPECT_NE(shown.out.find("MB held"), std::string::npos);
+  EXPECT_NE(shown.out.find("few triangles: short codes tell them apart"), std::string::npos);
   const Json tree = run_json("tetra.obj --stats" + std::string(quick))["results"][0]["tree"];
   expect_keys(tree["statistics"], {"nodes", "leaves", "empty_leaves", "references", "mean_depth",
                                    "expected_node_visits", "leaves_at_depth", "leaves_of_size"});

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cfenv>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -161,6 +162,39 @@ TEST(QueryCpu, ModeIsPutBackWhenABuildThrows) {
   const int after = std::fegetround();
   std::fesetround(FE_TONEAREST);
   EXPECT_EQ(after, FE_UPWARD);
+}
+
+// ---- Brute force in vectors ---------------------------------------------------------------------
+
+// Loops that end within a block of eight triangles, within what is looked at together, and between;
+// with triangles among them that no build takes.
+TEST(QueryCpu, BruteForceInVectorsIsTheScalarLoop) {
+  std::uint64_t hits = 0;
+  for (const std::uint32_t n : {1u, 7u, 8u, 9u, 511u, 512u, 513u, 1025u}) {
+    scene::Mesh mesh = scene::soup(n, 90 + n);
+    mesh = scene::joined(std::move(mesh), scene::random_bits(n % 4, 90));
+    const Tree tree = build(mesh.view(), options_for(References::once));
+    const std::vector<Ray> rays = test::RayMaker(mesh, tree.view(), n).all_kinds(200);
+    for (const Intersector intersector :
+         {Intersector::watertight, Intersector::fast, Intersector::single_precision,
+          Intersector::double_precision, Intersector::exact}) {
+      SCOPED_TRACE(std::to_string(n) + " triangles, " + to_string(intersector));
+      const std::vector<Hit> want =
+          test::brute_force(tree.view(), mesh.view(), rays,
+                            {.instructions = cpu::InstructionSet::portable}, intersector);
+      for (const std::size_t count : {1u, 64u, 65u, 200u}) {
+        const std::vector<Hit> got = test::brute_force(
+            tree.view(), mesh.view(), std::span(rays).first(count),
+            {.threads = 3, .instructions = cpu::InstructionSet::avx2}, intersector);
+        for (std::size_t i = 0; i < count; ++i) {
+          ASSERT_TRUE(same_bits(got[i], want[i]))
+              << print(rays[i]) << ": " << print(got[i]) << " instead of " << print(want[i]);
+          hits += test::is_hit(got[i]) ? 1 : 0;
+        }
+      }
+    }
+  }
+  EXPECT_GT(hits, 1000u);
 }
 
 // ---- Threads ------------------------------------------------------------------------------------

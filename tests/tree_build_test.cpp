@@ -305,6 +305,28 @@ TEST(TreeBuild, SkipsAreReported) {
   EXPECT_TRUE(soup.statistics().skip(Skip::compaction).taken);
 }
 
+TEST(TreeBuild, SkipsAreLookedForWhereTheyCanBe) {
+  const scene::Mesh mesh = scene::joined(scene::soup(300, 9), scene::identical(30));
+  const Statistics plain = test::build(mesh.view(), {.code_bits = 32}).statistics();
+  EXPECT_FALSE(plain.skip(Skip::wide_codes).considered);
+  EXPECT_TRUE(plain.skip(Skip::recoding).considered);
+  EXPECT_FALSE(plain.skip(Skip::recoding).taken) << "thirty alike are a crowd";
+  EXPECT_TRUE(plain.skip(Skip::compaction).considered);
+  const Statistics without = test::build(mesh.view(), {.recode_crowded = false}).statistics();
+  EXPECT_TRUE(without.skip(Skip::wide_codes).considered);
+  EXPECT_FALSE(without.skip(Skip::recoding).considered);
+  EXPECT_FALSE(without.skip(Skip::recoding).taken);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(Skip::count); ++i) {
+    const auto skip = static_cast<Skip>(i);
+    EXPECT_STRNE(reason(skip, true), reason(skip, false));
+    EXPECT_STRNE(reason(skip, true), "unknown");
+    EXPECT_STRNE(reason(skip, false), "unknown");
+    if (skip != Skip::radix_passes) {
+      EXPECT_FALSE(plain.skip(skip).saved_ms.has_value());
+    }
+  }
+}
+
 TEST(TreeBuild, OptionsAreRecordedAsChosen) {
   const Tree tree = test::build(scene::soup(100, 10).view(), {.leaf_size = 7});
   EXPECT_EQ(tree.options().leaf_size, 7u);

@@ -4,8 +4,12 @@
 #include "brute_force.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
 
 #include <zkd/build.hpp>
 #include <zkd/cpu/wide_tree.hpp>
@@ -21,13 +25,51 @@
 namespace zkd::bench::accuracy {
 namespace {
 
-constexpr std::uint32_t rays_a_case = 1024;
+int kind_of(std::uint64_t number) {
+  return static_cast<int>(number / 2 % test::small_mesh_kinds);  // `once`, then `all`
+}
 
-// The default gets half of the cases, the others what is left, `exact` few: it is slow. Neighbours,
-// `once` and `all`, get the same one; each mesh meets every one in sixteen variations.
+// The rays of each case. Many rays a tree where many are asked for, many trees where few are; and
+// fewer where a ray takes many times as long.
+class RaysOf {
+ public:
+  explicit RaysOf(std::uint64_t asked)
+      : most_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(asked / 1024, 256, 4096))) {}
+
+  [[nodiscard]] std::uint32_t a_case(std::uint64_t number) const {
+    return scene::is_slow_small_mesh(kind_of(number)) ? most_ / 8 : most_;
+  }
+
+  // Of those, how many are for `exact`: each mesh and setting meets it, with every kind of ray,
+  // but it is slow.
+  [[nodiscard]] static std::uint32_t exact(std::uint64_t number) {
+    return (number + number / 64) % 4 == 0 ? 16 : 0;
+  }
+
+  // Cases until there are so many rays.
+  [[nodiscard]] std::uint64_t cases(std::uint64_t rays) const {
+    std::uint64_t number = 0;
+    for (std::uint64_t sum = 0; sum < rays; ++number) sum += a_case(number);
+    return number;
+  }
+
+ private:
+  std::uint32_t most_;
+};
+
+// The others: the default gets half of the cases. Neighbours, `once` and `all`, get the same one;
+// each mesh meets every one in sixteen variations.
 std::size_t intersector_of(std::uint64_t number) {
-  constexpr std::size_t turn[] = {0, 1, 0, 2, 0, 3, 0, 1, 0, 2, 0, 3, 0, 1, 0, 4};
+  constexpr std::size_t turn[] = {0, 1, 0, 2, 0, 3, 0, 1, 0, 2, 0, 3, 0, 1, 0, 2};
   return turn[(number / 2 + number / (2 * test::small_mesh_kinds)) % 16];
+}
+constexpr std::size_t exact_one = 4;
+static_assert(all_intersectors[exact_one] == Intersector::exact);
+
+// Cases whose loop is itself held against the scalar one, which is its definition.
+bool is_loop_checked(std::uint64_t number) {
+  constexpr std::uint64_t of = 64;
+  return (number + number / of) % of == 0;  // every kind of mesh, `once` and `all`, in turn
 }
 
 bool same_bits(const Hit& a, const Hit& b) {
@@ -58,74 +100,117 @@ std::string describe(const std::string& mesh, std::uint64_t case_number,
          ", code bits " + std::to_string(options.code_bits);
 }
 
+// What answered the rays, in the order of the rows of a report.
+enum class Answerer : std::uint8_t { tree, wide_tree, cuda_tree };
+constexpr std::array answerers{Answerer::tree, Answerer::wide_tree, Answerer::cuda_tree};
+constexpr const char* prefix(Answerer answerer) {
+  constexpr const char* prefixes[] = {"", "wide ", "cuda "};
+  return prefixes[static_cast<std::size_t>(answerer)];
+}
+std::size_t row_of(Answerer answerer, std::size_t intersector) {
+  return static_cast<std::size_t>(answerer) * all_intersectors.size() + intersector;
+}
+
 struct CaseResult {
-  std::size_t intersector;  // which of all_intersectors
-  TreeAgainstLoop counts;
-  TreeAgainstLoop wide_counts;
-  TreeAgainstLoop cuda_counts;
+  std::array<TreeAgainstLoop, answerers.size() * all_intersectors.size()> of_row;
+  TreeAgainstLoop loop;
   std::string first_difference;
 };
 
-// Answers to the rays of a case, held against the loop's.
-TreeAgainstLoop compare(const std::vector<Hit>& by_tree, const std::vector<std::uint8_t>& occluded,
-                        const std::vector<Hit>& by_loop, const std::string& what,
-                        std::string& first_difference) {
-  TreeAgainstLoop counts;
-  counts.rays = by_loop.size();
-  for (std::size_t i = 0; i < by_loop.size(); ++i) {
-    const bool different = !same_bits(by_tree[i], by_loop[i]);
-    const bool any_different = (occluded[i] != 0) != (by_loop[i].triangle != no_triangle);
-    if ((different || any_different) && first_difference.empty()) {
-      first_difference = what + ", ray " + std::to_string(i);
+/// One tree, and what answers through it.
+class Case {
+ public:
+  Case(std::uint64_t number, std::uint64_t seed, std::uint32_t rays, bool cuda)
+      : number_(number),
+        cuda_(cuda),
+        random_(seed ^ (number * 0x9E3779B97F4A7C15u)),
+        named_(test::small_mesh(kind_of(number), seed + number / (2 * test::small_mesh_kinds))),
+        triangles_(named_.mesh.view()),
+        options_(options_of(number, random_)),
+        tree_(zkd::build(executor_, triangles_, options_)),
+        wide_(cpu::widen(executor_, tree_.view(), triangles_)),
+        rays_(test::RayMaker(named_.mesh, tree_.view(), random_.bits64()).all_kinds(rays)),
+        by_loop_(rays),
+        by_tree_(rays),
+        occluded_(rays) {}
+
+  CaseResult run() {
+    const std::span<const Ray> rays = rays_;
+    const std::uint32_t for_exact = RaysOf::exact(number_);
+    if (for_exact > 0) compare(rays.first(for_exact), exact_one);
+    compare(rays.subspan(for_exact), intersector_of(number_));
+    return std::move(result_);
+  }
+
+ private:
+  void compare(std::span<const Ray> rays, std::size_t which) {
+    const Intersector intersector = all_intersectors[which];
+    const TreeView& tree = tree_.view();
+    what_ = std::string(zkd::to_string(intersector)) + " on " +
+            describe(named_.name, number_, options_);
+    zkd::closest_hit_brute_force(executor_, tree, triangles_, rays, by_loop_, intersector);
+    if (is_loop_checked(number_)) {
+      const cpu::Executor scalar{.threads = 1, .instructions = cpu::InstructionSet::portable};
+      zkd::closest_hit_brute_force(scalar, tree, triangles_, rays, by_tree_, intersector);
+      count_hits(rays.size(), "the loop itself, ", result_.loop);
     }
-    counts.different += different ? 1 : 0;
-    counts.any_hit_different += any_different ? 1 : 0;
+    zkd::closest_hit(executor_, tree, triangles_, rays, by_tree_, {}, intersector);
+    zkd::any_hit(executor_, tree, triangles_, rays, occluded_, {}, intersector);
+    count(rays.size(), Answerer::tree, which);
+    cpu::closest_hit(executor_, wide_.view(), rays, by_tree_, {}, intersector);
+    cpu::any_hit(executor_, wide_.view(), rays, occluded_, {}, intersector);
+    count(rays.size(), Answerer::wide_tree, which);
+    if (cuda_ && intersector != Intersector::exact && !tree.empty()) {
+      // The loop is the host's: the device has to come to its bits.
+      const auto contender =
+          std::move(cuda_contenders(triangles_, std::span(&options_, 1), intersector).front());
+      Result unused;
+      contender->describe(unused);
+      contender->closest_hit(rays, std::span(by_tree_).first(rays.size()));
+      contender->any_hit(rays, std::span(occluded_).first(rays.size()));
+      count(rays.size(), Answerer::cuda_tree, which);
+    }
   }
-  return counts;
-}
 
-CaseResult compare_case(std::uint64_t number, std::uint64_t seed, bool cuda) {
-  const auto kind = static_cast<int>(number / 2 % test::small_mesh_kinds);
-  const std::uint64_t variation = number / (2 * test::small_mesh_kinds);
-  scene::Random random(seed ^ (number * 0x9E3779B97F4A7C15u));
-  const test::NamedMesh named = test::small_mesh(kind, seed + variation);
-  const TriangleView triangles = named.mesh.view();
-  const BuildOptions options = options_of(number, random);
-
-  cpu::Executor executor;
-  executor.threads = 1;
-  const Tree tree = zkd::build(executor, triangles, options);
-  const std::vector<Ray> rays =
-      test::RayMaker(named.mesh, tree.view(), random.bits64()).all_kinds(rays_a_case);
-  std::vector<Hit> by_tree(rays.size());
-  std::vector<Hit> by_loop(rays.size());
-  std::vector<std::uint8_t> occluded(rays.size());
-  const Intersector intersector = all_intersectors[intersector_of(number)];
-  zkd::closest_hit(executor, tree.view(), triangles, rays, by_tree, {}, intersector);
-  zkd::closest_hit_brute_force(executor, tree.view(), triangles, rays, by_loop, intersector);
-  zkd::any_hit(executor, tree.view(), triangles, rays, occluded, {}, intersector);
-
-  CaseResult result{intersector_of(number), {}, {}, {}, {}};
-  const std::string what =
-      std::string(zkd::to_string(intersector)) + " on " + describe(named.name, number, options);
-  result.counts = compare(by_tree, occluded, by_loop, what, result.first_difference);
-  const cpu::WideTree wide = cpu::widen(executor, tree.view(), triangles);
-  cpu::closest_hit(executor, wide.view(), rays, by_tree, {}, intersector);
-  cpu::any_hit(executor, wide.view(), rays, occluded, {}, intersector);
-  result.wide_counts = compare(by_tree, occluded, by_loop, "wide " + what, result.first_difference);
-  if (cuda && intersector != Intersector::exact && !tree.view().empty()) {
-    // The loop is the host's: the device has to come to its bits.
-    const auto contender =
-        std::move(cuda_contenders(triangles, std::span(&options, 1), intersector).front());
-    Result unused;
-    contender->describe(unused);
-    contender->closest_hit(rays, by_tree);
-    contender->any_hit(rays, occluded);
-    result.cuda_counts =
-        compare(by_tree, occluded, by_loop, "cuda " + what, result.first_difference);
+  // Answers of the first rays, held against the loop's.
+  void count(std::size_t rays, Answerer answerer, std::size_t which) {
+    TreeAgainstLoop& counts = result_.of_row[row_of(answerer, which)];
+    count_hits(rays, prefix(answerer), counts);
+    for (std::size_t i = 0; i < rays; ++i) {
+      if ((occluded_[i] != 0) == (by_loop_[i].triangle != no_triangle)) continue;
+      ++counts.any_hit_different;
+      found(prefix(answerer), i);
+    }
   }
-  return result;
-}
+  void count_hits(std::size_t rays, const char* answerer, TreeAgainstLoop& counts) {
+    counts.rays += rays;
+    for (std::size_t i = 0; i < rays; ++i) {
+      if (same_bits(by_tree_[i], by_loop_[i])) continue;
+      ++counts.different;
+      found(answerer, i);
+    }
+  }
+  void found(const char* answerer, std::size_t ray) {
+    if (!result_.first_difference.empty()) return;
+    result_.first_difference = answerer + what_ + ", ray " + std::to_string(ray);
+  }
+
+  std::uint64_t number_;
+  bool cuda_;
+  scene::Random random_;
+  test::NamedMesh named_;
+  TriangleView triangles_;
+  BuildOptions options_;
+  cpu::Executor executor_{.threads = 1};
+  Tree tree_;
+  cpu::WideTree wide_;
+  std::vector<Ray> rays_;
+  std::vector<Hit> by_loop_;
+  std::vector<Hit> by_tree_;
+  std::vector<std::uint8_t> occluded_;
+  std::string what_;
+  CaseResult result_;
+};
 
 }  // namespace
 
@@ -143,7 +228,7 @@ std::uint64_t TreeAgainstLoops::rays() const {
 }
 
 std::uint64_t TreeAgainstLoops::different() const {
-  std::uint64_t sum = 0;
+  std::uint64_t sum = loop.different;
   for (const TreeAgainstLoop& one : of_intersector) sum += one.different + one.any_hit_different;
   return sum;
 }
@@ -151,24 +236,23 @@ std::uint64_t TreeAgainstLoops::different() const {
 TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed, int threads,
                                           bool cuda) {
   TreeAgainstLoops all;
-  for (const std::string prefix : {"", "wide ", "cuda "}) {
-    if (prefix == "cuda " && !cuda) break;
+  for (const Answerer answerer : answerers) {
     for (const Intersector intersector : all_intersectors) {
-      all.of_intersector.push_back({prefix + zkd::to_string(intersector)});
+      all.of_intersector.push_back({prefix(answerer) + std::string(zkd::to_string(intersector))});
     }
   }
-  all.cases = (rays + rays_a_case - 1) / rays_a_case;
+  const RaysOf rays_of(rays);
+  all.cases = rays_of.cases(rays);
   scene::Progress progress("tree against brute force", all.cases);
   std::uint64_t first_case = all.cases;
 #pragma omp parallel for num_threads(threads) schedule(dynamic)
   for (std::uint64_t number = 0; number < all.cases; ++number) {
-    const CaseResult result = compare_case(number, seed, cuda);
+    const CaseResult result = Case(number, seed, rays_of.a_case(number), cuda).run();
 #pragma omp critical(zkd_accuracy_brute_force)
     {
-      all.of_intersector[result.intersector] += result.counts;
-      all.of_intersector[all_intersectors.size() + result.intersector] += result.wide_counts;
-      if (cuda)
-        all.of_intersector[2 * all_intersectors.size() + result.intersector] += result.cuda_counts;
+      for (std::size_t row = 0; row < result.of_row.size(); ++row)
+        all.of_intersector[row] += result.of_row[row];
+      all.loop += result.loop;
       if (!result.first_difference.empty() && number < first_case) {
         first_case = number;
         all.first_difference = result.first_difference;
@@ -176,6 +260,7 @@ TreeAgainstLoops compare_with_brute_force(std::uint64_t rays, std::uint64_t seed
     }
     progress.advance(1);
   }
+  if (!cuda) all.of_intersector.resize(row_of(Answerer::cuda_tree, 0));
   return all;
 }
 

@@ -171,6 +171,7 @@ Json json_of(const TreeAgainstLoops& e3) {
           {"different", e3.different()},
           {"cases", e3.cases},
           {"first_difference", text_or_null(e3.first_difference)},
+          {"loop", {{"rays", e3.loop.rays}, {"different", rate(e3.loop.different, e3.loop.rays)}}},
           {"rows", rows}};
 }
 

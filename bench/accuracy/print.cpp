@@ -70,6 +70,8 @@ void print_e3(std::ostream& out, const TreeAgainstLoops& e3) {
     line(out, "%-29s%12llu rays%18s different%18s any hit", one.name.c_str(), ull(one.rays),
          seen(one.different, one.rays).c_str(), seen(one.any_hit_different, one.rays).c_str());
   }
+  line(out, "%-29s%12llu rays%18s different", "the loop, of its definition", ull(e3.loop.rays),
+       seen(e3.loop.different, e3.loop.rays).c_str());
 }
 
 void print_e5(std::ostream& out, const Leaks& e5) {

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include <zkd/config.hpp>
 
@@ -30,7 +32,7 @@ enum class Stage : std::uint8_t {
 /// "validate", "encode", ... Static storage.
 ZKD_API const char* to_string(Stage stage) noexcept;
 
-/// Work that a scene did not need and that was left out without changing any answer.
+/// Work that a scene may not need, and that is then left out without changing any answer.
 enum class Skip : std::uint8_t {
   radix_passes,  ///< digits equal in every code; amount: passes left out
   flat_axes,     ///< axes without extent get no bits; amount: axes
@@ -43,10 +45,20 @@ enum class Skip : std::uint8_t {
 /// "radix passes", "flat axes", ... Static storage.
 ZKD_API const char* to_string(Skip skip) noexcept;
 
-/// One skip: whether it was taken and how much work it left out.
+/// Why it was taken: "every code has the same digit there"; or why not. Static storage.
+ZKD_API const char* reason(Skip skip, bool taken) noexcept;
+
+/// One skip: whether it was taken, how much work it left out, and what that would have cost.
 struct SkipReport {
+  /// Whether the build looked for it: not where its options, its builder or its backend rule it
+  /// out. (Devices sort by every digit. Passes over no triangle at all are taken for left out.)
+  bool considered = false;
   bool taken = false;
   std::uint32_t amount = 0;  ///< in the unit named at the enumerator
+
+  /// Wall time that it saved, by what the same work took elsewhere in this build. Nothing where
+  /// that was not done, so that nobody knows: of all skips, radix_passes alone has like passes.
+  std::optional<double> saved_ms;
 };
 
 /// What one build found, made and took. Bytes are as asked of the memory resource.
@@ -78,9 +90,17 @@ struct Statistics {
   /// stages.
   double total_ms = 0.0;
   std::array<double, static_cast<std::size_t>(Stage::count)> stage_ms{};
+
+  /// Most bytes that the build held during each stage, the parts of the tree among them. Nothing
+  /// where the backend does not know: Builder::sah, and devices, which plan all memory beforehand.
+  std::array<std::optional<std::uint64_t>, static_cast<std::size_t>(Stage::count)> stage_bytes{};
+
   std::array<SkipReport, static_cast<std::size_t>(Skip::count)> skips{};
 
   [[nodiscard]] double ms(Stage stage) const { return stage_ms[static_cast<std::size_t>(stage)]; }
+  [[nodiscard]] std::optional<std::uint64_t> bytes(Stage stage) const {
+    return stage_bytes[static_cast<std::size_t>(stage)];
+  }
   [[nodiscard]] const SkipReport& skip(Skip what) const {
     return skips[static_cast<std::size_t>(what)];
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The names of options, intersectors, stages and skips.
+// The names of options, intersectors, stages and skips, and the reasons for those.
 #include <zkd/cpu/executor.hpp>
 #include <zkd/options.hpp>
 #include <zkd/query.hpp>
@@ -55,6 +55,19 @@ const char* to_string(Stage stage) noexcept {
 const char* to_string(Skip skip) noexcept {
   return name_of(std::array{"radix passes", "flat axes", "wide codes", "recoding", "compaction"},
                  skip);
+}
+const char* reason(Skip skip, bool taken) noexcept {
+  return taken
+             ? name_of(
+                   std::array{"every code has the same digit there", "nothing extends along them",
+                              "few triangles: short codes tell them apart", "no crowded trunk",
+                              "no triangle left out"},
+                   skip)
+             : name_of(
+                   std::array{"codes differ in every digit", "the scene extends along every axis",
+                              "many triangles: short codes would crowd them", "trunks are crowded",
+                              "triangles were left out, the others have to close up"},
+                   skip);
 }
 
 }  // namespace zkd

@@ -40,18 +40,19 @@ Statistics describe(const BuildState& state, const BuildOptions& options, std::u
 
   if (options.builder != Builder::morton) return statistics;  // the skips are of codes
 
-  const auto report = [&statistics](Skip what, std::uint32_t amount) {
-    statistics.skips[static_cast<std::size_t>(what)] = {amount != 0, amount};
+  const auto report = [&statistics](Skip what, bool considered, std::uint32_t amount) {
+    statistics.skips[static_cast<std::size_t>(what)] = {considered, amount != 0, amount, {}};
   };
   std::uint32_t flat = 0;
   for (int a = 0; a < 3; ++a)
     flat += state.report.bounds.lo[a] == state.report.bounds.hi[a] ? 1 : 0;
-  report(Skip::radix_passes, radix_passes_left_out);
-  report(Skip::flat_axes, flat);
-  report(Skip::wide_codes,
+  report(Skip::radix_passes, radix_passes_left_out != 0, radix_passes_left_out);
+  report(Skip::flat_axes, true, flat);
+  report(Skip::wide_codes, options.code_bits == 0,
          options.code_bits == 0 && state.report.valid < wide_code_threshold ? 32 : 0);
-  report(Skip::recoding, options.recode_crowded && counts.crowded_trunks == 0 ? 1 : 0);
-  report(Skip::compaction, counts.left_out == 0 ? 1 : 0);
+  report(Skip::recoding, options.recode_crowded,
+         options.recode_crowded && counts.crowded_trunks == 0 ? 1 : 0);
+  report(Skip::compaction, true, counts.left_out == 0 ? 1 : 0);
   return statistics;
 }
 

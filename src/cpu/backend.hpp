@@ -12,6 +12,7 @@
 #include <cstring>
 #include <memory>
 #include <memory_resource>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -260,6 +261,7 @@ class Backend {
   void allocate_tree(core::Count trunks) {
     core::TreeArrays arrays{};
     tree_block_ = core::HostBlock(memory_, core::bytes_of(arrays, size(trunks)));
+    note_held();
     core::Arena arena(tree_block_.data());
     arrays.lay_out(arena, size(trunks));
     arrays_ = arrays;
@@ -268,6 +270,7 @@ class Backend {
     reference_block_ =
         core::HostBlock(memory_, std::size_t{size(references)} * sizeof(std::uint32_t));
     references_ = static_cast<std::uint32_t*>(reference_block_.data());
+    note_held();
   }
 
   [[nodiscard]] TreeHeader* header() const { return arrays_.header; }
@@ -284,12 +287,19 @@ class Backend {
           std::chrono::duration<double, std::milli>(now - since_).count();
     running_ = next;
     since_ = now;
+    note_held();
   }
   /// Ends the last stage.
   void finish() { stage(Stage::count); }
 
   [[nodiscard]] const auto& stage_ms() const { return stage_ms_; }
-  [[nodiscard]] std::uint32_t passes_left_out() const { return passes_left_out_; }
+  [[nodiscard]] const auto& stage_bytes() const { return stage_bytes_; }
+  [[nodiscard]] std::uint32_t passes_left_out() const { return passes_left_out_.count; }
+  /// What these would have taken; nothing where nobody knows.
+  [[nodiscard]] std::optional<double> passes_saved_ms() const {
+    if (passes_left_out_.count == 0 || !passes_left_out_.all_have_a_time) return std::nullopt;
+    return passes_left_out_.saved_ms;
+  }
   [[nodiscard]] std::size_t workspace_bytes() const { return most_held_; }
   [[nodiscard]] std::pmr::memory_resource* memory() const { return memory_; }
   core::HostBlock& tree_block() { return tree_block_; }
@@ -321,7 +331,17 @@ class Backend {
     std::size_t held = block.bytes();
     for (int i = 0; i < blocks_used_; ++i) held += blocks_[i].bytes();
     most_held_ = std::max(most_held_, held);
+    note_held(block.bytes());
     return block;
+  }
+
+  /// What is held now, and `more`, for the stage that runs.
+  void note_held(std::size_t more = 0) {
+    if (running_ == Stage::count) return;
+    std::uint64_t held = tree_block_.bytes() + reference_block_.bytes() + more;
+    for (int i = 0; i < blocks_used_; ++i) held += blocks_[i].bytes();
+    auto& most = stage_bytes_[static_cast<std::size_t>(running_)];
+    most = std::max(most.value_or(0), held);
   }
 
   /// Goes up from a finished child until it is the first to arrive.
@@ -351,7 +371,8 @@ class Backend {
   Stage running_ = Stage::count;
   std::chrono::steady_clock::time_point since_;
   std::array<double, static_cast<std::size_t>(Stage::count)> stage_ms_{};
-  std::uint32_t passes_left_out_ = 0;
+  std::array<std::optional<std::uint64_t>, static_cast<std::size_t>(Stage::count)> stage_bytes_{};
+  PassesLeftOut passes_left_out_;
 };
 
 }  // namespace zkd::cpu

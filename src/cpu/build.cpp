@@ -26,8 +26,12 @@ Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const Buil
   const core::BuildState& state = *pipeline.state();
   Statistics statistics =
       core::describe(state, options, triangles.triangle_count, backend.passes_left_out());
+  SkipReport& passes = statistics.skips[static_cast<std::size_t>(Skip::radix_passes)];
+  passes.considered = true;
+  passes.saved_ms = backend.passes_saved_ms();
   statistics.workspace_bytes = backend.workspace_bytes();
   statistics.stage_ms = backend.stage_ms();
+  statistics.stage_bytes = backend.stage_bytes();
   const TreeView view{backend.header(), backend.nodes(), backend.leaf_offsets(),
                       backend.references()};
   if (options.measure_quality) core::measure_quality(view, statistics);

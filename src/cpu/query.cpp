@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Queries on the CPU: single rays, spans of rays on all threads, and brute force.
+// Queries on the CPU: single rays, and spans of rays on all threads.
 #include <zkd/query.hpp>
 
 #include <algorithm>
@@ -88,17 +88,6 @@ void any_hit(const cpu::Executor& executor, const TreeView& tree, const Triangle
   trace_all<true>(
       executor, tree, triangles, rays, std::min(rays.size(), occluded.size()), costs, intersector,
       [occluded](std::size_t i, const auto& found) { occluded[i] = found.found() ? 1 : 0; });
-}
-
-void closest_hit_brute_force(const cpu::Executor& executor, const TreeView& tree,
-                             const TriangleView& triangles, std::span<const Ray> rays,
-                             std::span<Hit> hits, Intersector intersector) noexcept {
-  const std::size_t count = std::min(rays.size(), hits.size());
-  with_intersector(intersector, [&]<class Intersect>() {
-    for_each_ray(cpu::Threads(executor), count, 1, [=](std::size_t i) {
-      hits[i] = core::to_hit(core::trace_brute_force<Intersect>(tree, triangles, rays[i]));
-    });
-  });
 }
 
 glm::vec3 offset_origin(const TriangleView& triangles, const Hit& hit, const glm::vec3& direction,

@@ -25,16 +25,24 @@ auto with_intersector(Intersector intersector, Call call) {
   return core::with_intersector(intersector, call);
 }
 
-/// work(i) for every ray i. A pass counts in 32 bits: longer spans are done in several.
+/// work(begin, end) for ranges of rays that are all of them. A pass counts in 32 bits: longer spans
+/// are done in several.
 template <class Work>
-void for_each_ray(const Threads& threads, std::size_t count, std::uint32_t at_once, Work work) {
+void for_each_range_of_rays(const Threads& threads, std::size_t count, std::uint32_t at_once,
+                            Work work) {
   constexpr std::size_t most = std::size_t{1} << 30;
   for (std::size_t done = 0; done < count; done += most) {
     const auto n = static_cast<std::uint32_t>(std::min(most, count - done));
-    threads.share(n, at_once, [=](Range range) {
-      for (std::size_t i = done + range.begin; i < done + range.end; ++i) work(i);
-    });
+    threads.share(n, at_once, [=](Range range) { work(done + range.begin, done + range.end); });
   }
+}
+
+/// work(i) for every ray i.
+template <class Work>
+void for_each_ray(const Threads& threads, std::size_t count, std::uint32_t at_once, Work work) {
+  for_each_range_of_rays(threads, count, at_once, [=](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) work(i);
+  });
 }
 
 }  // namespace zkd::cpu

@@ -136,6 +136,15 @@ ZKD_HOST_DEVICE inline typename Intersect::Candidate trace(const TreeView& tree,
   return {};
 }
 
+/// A step of a loop over all triangles: `best` becomes the hit on this one, if that comes before.
+template <class Intersect>
+ZKD_HOST_DEVICE inline void test_in_loop(const Intersect& intersect, const Corners& corners,
+                                         std::uint32_t id, typename Intersect::Candidate& best) {
+  typename Intersect::Candidate candidate = best;
+  // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
+  if (intersect(corners, id, candidate) && is_valid(corners)) best = candidate;
+}
+
 /// The nearest hit by a loop over all triangles. A ray is prepared by the tree's bounds and scale,
 /// as for a walk.
 template <class Intersect>
@@ -144,12 +153,8 @@ ZKD_HOST_DEVICE inline typename Intersect::Candidate trace_brute_force(
   const PreparedRay prepared(tree, ray, Intersect::hit_distance);
   const Intersect intersect(prepared, ray);
   typename Intersect::Candidate best;
-  for (std::uint32_t id = 0; prepared.valid && id < triangles.triangle_count; ++id) {
-    const Corners corners = corners_of(triangles, id);
-    typename Intersect::Candidate candidate = best;
-    // What a build leaves out may still seem to be hit, by rounding: it is looked at only then.
-    if (intersect(corners, id, candidate) && is_valid(corners)) best = candidate;
-  }
+  for (std::uint32_t id = 0; prepared.valid && id < triangles.triangle_count; ++id)
+    test_in_loop(intersect, corners_of(triangles, id), id, best);
   return best;
 }
 

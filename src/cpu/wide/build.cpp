@@ -18,6 +18,7 @@
 #include "core/check_input.hpp"
 #include "core/host_block.hpp"
 #include "cpu/threads.hpp"
+#include "cpu/wide/block.hpp"
 #include "cpu/wide/collapse.hpp"
 
 namespace zkd {
@@ -189,15 +190,7 @@ class Layout {
   }
 
   void write(TriangleBlock& block, const std::uint32_t* ids, std::uint32_t count) const {
-    for (std::uint32_t lane = 0; lane < static_cast<std::uint32_t>(wide); ++lane) {
-      const bool used = lane < count;
-      block.ids[lane] = used ? ids[lane] : TriangleBlock::unused;
-      for (int corner = 0; corner < 3; ++corner) {
-        const float* p = used ? triangles_.position(triangles_.index(ids[lane], corner)) : nullptr;
-        for (int a = 0; a < 3; ++a)
-          block.positions[corner][a][lane] = used ? p[a] : std::numeric_limits<float>::quiet_NaN();
-      }
-    }
+    fill(block, triangles_, count, [ids](std::uint32_t lane) { return ids[lane]; });
   }
 
   const TreeView& tree_;
