@@ -15,6 +15,7 @@ namespace zkd {
 /// references (from the parts of all threads to one tree).
 enum class Stage : std::uint8_t {
   validate,          ///< checks, triangle boxes, scene box, lattice
+  split,             ///< triangles cut into fragments, with References::budget
   encode,            ///< Morton codes
   sort,              ///< stable radix sort on the codes
   recode,            ///< crowded trunks coded again in their own box

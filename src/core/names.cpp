@@ -48,7 +48,7 @@ const char* cpu::to_string(InstructionSet value) noexcept {
   return name_of(std::array{"auto", "portable", "avx2"}, value);
 }
 const char* to_string(Stage stage) noexcept {
-  return name_of(std::array{"validate", "encode", "sort", "recode", "trunks", "essential_nodes",
+  return name_of(std::array{"validate", "split", "encode", "sort", "recode", "trunks", "essential_nodes",
                             "path_compression", "split_planes", "references", "tight_boxes"},
                  stage);
 }

@@ -27,6 +27,7 @@
 #include "core/planes.hpp"
 #include "core/recode.hpp"
 #include "core/references.hpp"
+#include "core/split.hpp"
 #include "core/status.hpp"
 #include "core/trunks.hpp"
 #include "core/validate.hpp"
@@ -141,6 +142,12 @@ struct WriteHeader {
   }
 };
 
+/// What is coded and sorted: triangles, or at most so many fragments of them.
+inline std::uint32_t most_elements(const BuildOptions& options, std::uint32_t triangles) {
+  return options.references == References::budget ? budget_of(options.budget, triangles)
+                                                  : triangles;
+}
+
 /// One build. `Code` only has to hold the bits of the lattice: it does not change the tree.
 template <class Code, class Backend>
 class MortonPipeline {
@@ -149,16 +156,19 @@ class MortonPipeline {
       : backend_(backend),
         triangles_(triangles),
         options_(options),
-        triangle_count_(static_cast<std::uint32_t>(triangles.triangle_count)) {}
+        triangle_count_(static_cast<std::uint32_t>(triangles.triangle_count)),
+        most_(most_elements(options, triangle_count_)) {}
 
   /// Runs all stages. The tree's arrays are the backend's.
   void run() {
     Workspace<Code> work;
-    backend_.take(work, triangle_count_);
+    backend_.take(work, most_);
+    if (splits()) backend_.take(split_, triangle_count_, most_);
     state_ = work.state;
     counts_ = &work.state->counts;
 
     validate(work);                              // 1 validate.hpp, 2 lattice.hpp
+    split(work);                                 //   split.hpp: with a budget of references
     encode(work);                                // 3 morton.hpp
     sort(work);                                  // 4 a verb of the backend
     const SortedKeys<Code> keys = recode(work);  // 5 recode.hpp
@@ -174,10 +184,12 @@ class MortonPipeline {
   [[nodiscard]] const BuildState* state() const { return state_; }
 
  private:
-  [[nodiscard]] Count given() const { return {&counts_->given, triangle_count_}; }
-  [[nodiscard]] Count listed() const { return {&counts_->listed, triangle_count_}; }
-  [[nodiscard]] Count trunks() const { return {&counts_->trunks, triangle_count_}; }
-  [[nodiscard]] Count nodes() const { return {&counts_->nodes, triangle_count_}; }
+  [[nodiscard]] Count given() const { return {&counts_->given, most_}; }
+  [[nodiscard]] Count listed() const { return {&counts_->listed, most_}; }
+  [[nodiscard]] Count trunks() const { return {&counts_->trunks, most_}; }
+  [[nodiscard]] Count nodes() const { return {&counts_->nodes, most_}; }
+
+  [[nodiscard]] bool splits() const { return options_.references == References::budget; }
 
   /// Bits that a code may have; the lattice may use fewer, whose digits the sort leaves out.
   [[nodiscard]] std::uint32_t code_bits_bound() const {
@@ -188,16 +200,24 @@ class MortonPipeline {
   void validate(Workspace<Code>& work) {
     backend_.stage(Stage::validate);
     backend_.reduce(Count{nullptr, triangle_count_}, &state_->report,
-                    ValidateTriangle{triangles_, work.boxes});
+                    ValidateTriangle{triangles_, splits() ? split_.boxes : work.boxes});
     backend_.for_each(one, PrepareScene{state_, triangles_, options_.code_bits, options_.axis_order,
                                         options_.invalid_triangles});
     backend_.raise(&counts_->status, triangles_);
   }
 
+  void split(Workspace<Code>& work) {
+    if (!splits()) return;
+    backend_.stage(Stage::split);
+    SplitAll<Backend>{triangles_, split_,          &state_->lattice, &state_->report.bounds,
+                      counts_,    options_.budget, work.boxes}
+        .run(backend_);
+  }
+
   void encode(Workspace<Code>& work) {
     backend_.stage(Stage::encode);
     std::uint32_t* ids = work.sort.values;
-    if (backend_.may_exist(Count{&counts_->left_out, triangle_count_}))
+    if (backend_.may_exist(Count{&counts_->left_out, most_}))
       backend_.select(given(), IsListed{work.boxes}, ids, &counts_->listed);
     else
       backend_.for_each(listed(), Number{ids});
@@ -279,6 +299,15 @@ class MortonPipeline {
       backend_.allocate_references(listed());
       backend_.for_each(listed(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
       backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.trunk_first, backend_.leaf_offsets()});
+    } else if (splits()) {
+      backend_.for_each(one, CloseTrunks{counts_, work.trunk_first});
+      const TrunkOfFragments fragments{work.sort.values, work.trunk_first, split_.owners,
+                                       options_.leaf_size};
+      backend_.exclusive_scan(trunks(), CountOwners{fragments}, backend_.leaf_offsets(),
+                              &counts_->references);
+      backend_.allocate_references(Count{&counts_->references, most_});
+      backend_.for_each(trunks(),
+                        ListOwners{fragments, backend_.leaf_offsets(), backend_.references()});
     } else {
       // Memory that earlier stages are done with.
       auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);
@@ -306,7 +335,8 @@ class MortonPipeline {
     backend_.stage(Stage::tight_boxes);
     backend_.for_each(nodes(), Fill{work.arrivals, 0});
     backend_.climb(trunks(), work.arrivals,
-                   TightBoxes{work.boxes, backend_.leaf_offsets(), backend_.references(),
+                   TightBoxes{work.boxes, splits() ? work.trunk_first : backend_.leaf_offsets(),
+                              splits() ? work.sort.values : backend_.references(),
                               work.parents_of_nodes, work.parents_of_leaves, &state_->frame,
                               options_.references == References::all, backend_.nodes()});
     backend_.for_each(one, WriteHeader{state_, backend_.header()});
@@ -316,9 +346,11 @@ class MortonPipeline {
   const TriangleView& triangles_;
   const BuildOptions& options_;
   std::uint32_t triangle_count_;
+  std::uint32_t most_;
   BuildState* state_ = nullptr;
   BuildCounts* counts_ = nullptr;
   RecodeWorkspace recoded_{};
+  SplitWorkspace split_{};
 };
 
 }  // namespace zkd::core

@@ -12,6 +12,7 @@
 //   for_each(count, f)                 f(i)
 //   reduce(count, &out, f)             out = T{}; f(i, out) for all i, in any grouping (T::combine)
 //   select(count, f, out, &total)      the i for which f(i), in order
+//   histogram(count, f, bins, out)     out[b] = how many i have f(i) = b, below bins (most_bins at most)
 //   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
 //   segmented_reduce(segments, offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s])
 //   radix_sort(buffers, count, bits)   stable; says in which of the buffers the result is
@@ -51,6 +52,9 @@ struct Count {
 
 /// A pass over a single element: work for one thread.
 inline constexpr Count one{nullptr, 1};
+
+/// A histogram may have as many: they fit into the shared memory of a block.
+inline constexpr std::uint32_t most_bins = 1024;
 
 /// Functors that have to be made ready (see above).
 template <class Functor>

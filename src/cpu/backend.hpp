@@ -96,6 +96,27 @@ class Backend {
     *total = end;
   }
 
+  template <class Functor>
+  void histogram(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+    const std::uint32_t n = size(count);
+    const int team = threads_.team(n);
+    Scratch<std::uint32_t> parts(*this, static_cast<std::size_t>(team) * bins);
+    threads_.divide(n, team, [f, bins, parts = parts.data](Range range, int thread) {
+      Functor g = loaded(f);
+      std::uint32_t* mine = parts + static_cast<std::size_t>(thread) * bins;
+      std::fill(mine, mine + bins, 0);
+      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        const std::uint32_t bin = g(i);
+        if (bin < bins) ++mine[bin];
+      }
+    });
+    for (std::uint32_t bin = 0; bin < bins; ++bin) {
+      out[bin] = 0;
+      for (int thread = 0; thread < team; ++thread)
+        out[bin] += parts.data[static_cast<std::size_t>(thread) * bins + bin];
+    }
+  }
+
   template <class Functor, class Total>
   void exclusive_scan(core::Count count, Functor f, std::uint32_t* out, Total* total) {
     const std::uint32_t n = size(count);
@@ -237,7 +258,8 @@ class Backend {
   static MemoryRequirement requirement(const Executor& executor, std::uint64_t triangle_count,
                                        const BuildOptions& options, bool wide_codes,
                                        std::uint64_t reference_count) {
-    const auto triangles = static_cast<std::uint32_t>(triangle_count);
+    const std::uint32_t triangles =
+        core::most_elements(options, static_cast<std::uint32_t>(triangle_count));
     MemoryRequirement most;
     most.workspace_bytes = wide_codes ? core::bytes_of(core::Workspace<std::uint64_t>{}, triangles)
                                       : core::bytes_of(core::Workspace<std::uint32_t>{}, triangles);
@@ -249,6 +271,8 @@ class Backend {
     if (options.references == References::all)
       most.workspace_bytes += core::bytes_of(core::NotesWorkspace{}, triangles) +
                               core::bytes_of(core::ReferenceWorkspace{}, reference_count);
+    if (options.references == References::budget)
+      most.workspace_bytes += core::bytes_of(core::SplitWorkspace{}, triangle_count, triangles);
     // Of what single verbs take for themselves, a sort by 64 bits takes most.
     const int team = Threads(executor).team(std::max<std::uint64_t>(triangles, reference_count));
     most.workspace_bytes += core::bytes_of(SortScratch{}, team, digits_of(64));

@@ -81,6 +81,25 @@ struct CombinePartial {
   __device__ void operator()(std::uint32_t i, T& value) const { value.combine(partial[i]); }
 };
 
+/// Every block counts for itself first.
+template <class Functor>
+__global__ void __launch_bounds__(block_size)
+    histogram_kernel(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+  __shared__ std::uint32_t counted[core::most_bins];
+  for (std::uint32_t bin = threadIdx.x; bin < bins; bin += block_size) counted[bin] = 0;
+  __syncthreads();
+  const std::uint32_t n = actual(count);
+  const std::uint64_t stride = std::uint64_t{gridDim.x} * block_size;
+  Functor g = loaded(f);
+  for (std::uint64_t i = thread_number(); i < n; i += stride) {
+    const std::uint32_t bin = g(static_cast<std::uint32_t>(i));
+    if (bin < bins) atomicAdd(&counted[bin], 1u);
+  }
+  __syncthreads();
+  for (std::uint32_t bin = threadIdx.x; bin < bins; bin += block_size)
+    if (counted[bin] != 0) atomicAdd(&out[bin], counted[bin]);
+}
+
 /// Gives keys behind the actual count the greatest value: the sort leaves them there, since it is
 /// stable.
 template <class Key>
@@ -135,6 +154,12 @@ class Device {
   template <class Functor>
   void climb(core::Count leaves, std::uint32_t* arrivals, Functor f) {
     enqueue(blocks_for(leaves.bound), climb_kernel<Functor>, leaves, arrivals, f);
+  }
+
+  template <class Functor>
+  void histogram(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+    enqueue(std::min(most_partials, blocks_for(count.bound)), histogram_kernel<Functor>, count, f,
+            bins, out);
   }
 
   template <class T, class Functor>

@@ -175,6 +175,17 @@ class Device {
     });
   }
 
+  template <class Functor>
+  void histogram(core::Count count, const Functor& f, std::uint32_t bins, std::uint32_t* out) {
+    if (bins > core::most_bins) throw std::logic_error("a histogram of too many bins");
+    enqueue("histogram", count, f, [=](test::Random& random) {
+      in_any_order(actual(count), random, [&](std::uint32_t i) {
+        const std::uint32_t bin = loaded(f)(i);
+        if (bin < bins) ++out[bin];
+      });
+    });
+  }
+
   template <class Functor, class Total>
   void exclusive_scan(void* scratch, std::size_t& bytes, core::Count count, const Functor& f,
                       std::uint32_t* out, Total* total) {
