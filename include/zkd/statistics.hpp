@@ -18,6 +18,7 @@ enum class Stage : std::uint8_t {
   split,             ///< triangles cut into fragments, with References::budget
   encode,            ///< Morton codes
   sort,              ///< stable radix sort on the codes
+  clusters,          ///< the upper part of the tree by SAH, with Quality::balanced
   recode,            ///< crowded trunks coded again in their own box
   trunks,            ///< ranges of codes that become leaves
   essential_nodes,   ///< where neighbouring trunks first differ

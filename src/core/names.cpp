@@ -48,8 +48,9 @@ const char* cpu::to_string(InstructionSet value) noexcept {
   return name_of(std::array{"auto", "portable", "avx2"}, value);
 }
 const char* to_string(Stage stage) noexcept {
-  return name_of(std::array{"validate", "split", "encode", "sort", "recode", "trunks", "essential_nodes",
-                            "path_compression", "split_planes", "references", "tight_boxes"},
+  return name_of(std::array{"validate", "split", "encode", "sort", "clusters", "recode", "trunks",
+                            "essential_nodes", "path_compression", "split_planes", "references",
+                            "tight_boxes"},
                  stage);
 }
 const char* to_string(Skip skip) noexcept {

@@ -18,6 +18,7 @@
 
 #include "core/arena.hpp"
 #include "core/boxes.hpp"
+#include "core/clusters.hpp"
 #include "core/compress.hpp"
 #include "core/essential.hpp"
 #include "core/frame.hpp"
@@ -110,12 +111,15 @@ struct PrepareScene {
   std::uint32_t code_bits_asked;
   AxisOrder order;
   InvalidTriangles invalid;
+  bool clusters;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
     admit_scene(*state, triangles, invalid);
-    state->lattice = make_lattice(widen(state->report.bounds),
-                                  choose_code_bits(code_bits_asked, state->report.valid), order,
-                                  state->frame.finest);
+    const std::uint32_t valid = state->report.valid;
+    std::uint32_t code_bits = choose_code_bits(code_bits_asked, valid);
+    if (clusters) code_bits = code_bits_below_path(code_bits, valid);
+    state->lattice =
+        make_lattice(widen(state->report.bounds), code_bits, order, state->frame.finest);
     state->coder = MortonCoder(state->lattice);
   }
 };
@@ -171,6 +175,7 @@ class MortonPipeline {
     split(work);                                 //   split.hpp: with a budget of references
     encode(work);                                // 3 morton.hpp
     sort(work);                                  // 4 a verb of the backend
+    arrange(work);                               //   clusters.hpp: for Quality::balanced
     const SortedKeys<Code> keys = recode(work);  // 5 recode.hpp
     find_trunks(work, keys);                     // 6 trunks.hpp
     find_essential_nodes(work);                  // 7 essential.hpp
@@ -189,6 +194,7 @@ class MortonPipeline {
   [[nodiscard]] Count trunks() const { return {&counts_->trunks, most_}; }
   [[nodiscard]] Count nodes() const { return {&counts_->nodes, most_}; }
 
+  [[nodiscard]] bool balanced() const { return options_.quality == Quality::balanced; }
   [[nodiscard]] bool splits() const { return options_.references == References::budget; }
 
   /// Bits that a code may have; the lattice may use fewer, whose digits the sort leaves out.
@@ -202,7 +208,7 @@ class MortonPipeline {
     backend_.reduce(Count{nullptr, triangle_count_}, &state_->report,
                     ValidateTriangle{triangles_, splits() ? split_.boxes : work.boxes});
     backend_.for_each(one, PrepareScene{state_, triangles_, options_.code_bits, options_.axis_order,
-                                        options_.invalid_triangles});
+                                        options_.invalid_triangles, balanced()});
     backend_.raise(&counts_->status, triangles_);
   }
 
@@ -230,9 +236,23 @@ class MortonPipeline {
     work.sort = backend_.radix_sort(work.sort, listed(), code_bits_bound());
   }
 
+  void arrange(Workspace<Code>& work) {
+    if constexpr (sizeof(Code) == 8) {
+      if (!balanced()) return;
+      backend_.stage(Stage::clusters);
+      backend_.take(clusters_, 1u);
+      ArrangeClusters<Backend> stage{work.boxes,     &state_->lattice,
+                                     &state_->coder, &state_->report.valid,
+                                     listed(),       clusters_.state};
+      work.sort = stage.run(backend_, work.sort);
+      cluster_planes_ = stage.planes();
+    }
+  }
+
   SortedKeys<Code> recode(Workspace<Code>& work) {
     backend_.stage(Stage::recode);
-    SortedKeys<Code> keys{work.sort.keys, nullptr, &state_->lattice.code_bits};
+    SortedKeys<Code> keys{work.sort.keys, nullptr,
+                          balanced() ? &clusters_.state->key_bits : &state_->lattice.code_bits};
     if (!options_.recode_crowded) return keys;
     SecondRound<Code, Backend> round{work.boxes,
                                      work.sort.keys,
@@ -281,15 +301,20 @@ class MortonPipeline {
     Node* nodes = backend_.nodes();
     const CrowdByPosition crowd{work.trunk_first, recoded_.first, &counts_->crowded_trunks,
                                 recoded_.lattices, recoded_.coders};
-    backend_.for_each(this->nodes(),
-                      PlaceSplitPlane<CrowdByPosition>{
-                          work.trunk_keys,
-                          work.levels,
-                          &state_->lattice,
-                          &state_->coder,
-                          crowd,
-                          &state_->frame.scale,
-                          {&nodes->axis, &nodes->plane, sizeof(Node) / sizeof(float)}});
+    const auto place = [&](const auto& scene) {
+      using Scene = std::decay_t<decltype(scene)>;
+      backend_.for_each(this->nodes(),
+                        PlaceSplitPlane<Scene, CrowdByPosition>{
+                            work.trunk_keys,
+                            work.levels,
+                            scene,
+                            crowd,
+                            &state_->frame.scale,
+                            {&nodes->axis, &nodes->plane, sizeof(Node) / sizeof(float)}});
+    };
+    if constexpr (sizeof(Code) == 8)
+      if (balanced()) return place(cluster_planes_);
+    place(LatticePlanes{&state_->lattice, &state_->coder});
   }
 
   void list_references(Workspace<Code>& work) {
@@ -351,6 +376,8 @@ class MortonPipeline {
   BuildCounts* counts_ = nullptr;
   RecodeWorkspace recoded_{};
   SplitWorkspace split_{};
+  ClusterRecord clusters_{};
+  ClusterPlanes cluster_planes_{};
 };
 
 }  // namespace zkd::core

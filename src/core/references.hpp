@@ -23,8 +23,8 @@ namespace zkd::core {
 
 /// Relative slack of the overlap test: a triangle is taken to touch a cell that it misses by less
 /// than about this times the largest coordinate (of a sliver: times as much more as the products
-/// cancel that make its normal). Rounding moves a projection by less than 2^-50 of the products that
-/// make it, so a triangle that touches is never lost.
+/// cancel that make its normal). Rounding moves a projection by less than 2^-50 of the products
+/// that make it, so a triangle that touches is never lost.
 inline constexpr double overlap_slack = 4.0e-14;
 
 /// A triangle in tree space, ready for overlap tests with many cells (Akenine-Moller: Fast 3D

@@ -17,6 +17,7 @@
 #include <zkd/traversal/arithmetic.hpp>
 #include <zkd/traversal/triangle.hpp>
 
+#include "core/area.hpp"
 #include "core/arena.hpp"
 #include "core/frame.hpp"
 #include "core/lattice.hpp"
@@ -31,14 +32,6 @@ ZKD_HOST_DEVICE inline std::uint32_t budget_of(float factor, std::uint32_t trian
   const double references = static_cast<double>(factor) * static_cast<double>(triangles);
   return references < static_cast<double>(max_count) ? static_cast<std::uint32_t>(references)
                                                      : max_count;
-}
-
-/// Half of a box's surface.
-ZKD_HOST_DEVICE inline double half_area(const Box& box) {
-  double side[3];
-  for (int a = 0; a < 3; ++a)
-    side[a] = static_cast<double>(box.hi[a]) - static_cast<double>(box.lo[a]);
-  return side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
 }
 
 /// A plane of the lattice that cuts a box.

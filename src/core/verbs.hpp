@@ -12,8 +12,8 @@
 //   for_each(count, f)                 f(i)
 //   reduce(count, &out, f)             out = T{}; f(i, out) for all i, in any grouping (T::combine)
 //   select(count, f, out, &total)      the i for which f(i), in order
-//   histogram(count, f, bins, out)     out[b] = how many i have f(i) = b, below bins (most_bins at most)
-//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
+//   histogram(count, f, bins, out)     out[b] = how many i have f(i) = b, below bins (most_bins at
+//   most) exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
 //   segmented_reduce(segments, offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s])
 //   radix_sort(buffers, count, bits)   stable; says in which of the buffers the result is
 //   climb(leaves, arrivals, f)         f.begin(leaf), then f.rise(node) for each node whose second

@@ -273,6 +273,10 @@ class Backend {
                               core::bytes_of(core::ReferenceWorkspace{}, reference_count);
     if (options.references == References::budget)
       most.workspace_bytes += core::bytes_of(core::SplitWorkspace{}, triangle_count, triangles);
+    if (options.quality == Quality::balanced)
+      most.workspace_bytes +=
+          core::bytes_of(core::ClusterRecord{}, 1u) +
+          core::bytes_of(core::ClusterWorkspace{}, core::most_clusters(triangles));
     // Of what single verbs take for themselves, a sort by 64 bits takes most.
     const int team = Threads(executor).team(std::max<std::uint64_t>(triangles, reference_count));
     most.workspace_bytes += core::bytes_of(SortScratch{}, team, digits_of(64));

@@ -57,8 +57,7 @@ struct TreeAccess {
 };
 
 inline Capacity capacity_for(std::uint64_t triangles, const BuildOptions& options) {
-  const std::uint64_t leaves =
-      core::most_elements(options, static_cast<std::uint32_t>(triangles));
+  const std::uint64_t leaves = core::most_elements(options, static_cast<std::uint32_t>(triangles));
   return {leaves, options.references == References::all ? options.reference_capacity : leaves};
 }
 

@@ -13,10 +13,10 @@
 #include "core/outcome.hpp"
 #include "core/pipeline.hpp"
 #include "core/quality.hpp"
+#include "core/rounding.hpp"
 #include "cpu/backend.hpp"
 #include "cpu/sah/divide.hpp"
 #include "cpu/sah/front.hpp"
-#include "core/rounding.hpp"
 
 namespace zkd::cpu::sah {
 namespace {
