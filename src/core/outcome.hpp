@@ -39,6 +39,8 @@ inline BuildOptions used_options(const BuildState& state, const BuildOptions& op
                                  Backend backend) {
   BuildOptions used = options;
   used.backend = backend;
+  if (used.references == References::automatic)
+    used.references = state.counts.splits != 0 ? References::budget : References::once;
   used.code_bits = choose_code_bits(options.code_bits, state.report.valid);
   return used;
 }

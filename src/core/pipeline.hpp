@@ -112,10 +112,16 @@ struct PrepareScene {
   AxisOrder order;
   InvalidTriangles invalid;
   bool clusters;
+  References references;
+  const std::uint32_t* sizes;  ///< for References::automatic
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
     admit_scene(*state, triangles, invalid);
     const std::uint32_t valid = state->report.valid;
+    const bool splits = references == References::automatic
+                            ? is_uneven(sizes, state->report.bounds, valid)
+                            : references == References::budget;
+    state->counts.splits = splits ? 1 : 0;
     std::uint32_t code_bits = choose_code_bits(code_bits_asked, valid);
     if (clusters) code_bits = code_bits_below_path(code_bits, valid);
     state->lattice =
@@ -146,10 +152,14 @@ struct WriteHeader {
   }
 };
 
+/// Whether triangles may have to be split; with References::automatic the scene decides.
+inline bool may_split(const BuildOptions& options) {
+  return options.references == References::budget || options.references == References::automatic;
+}
+
 /// What is coded and sorted: triangles, or at most so many fragments of them.
 inline std::uint32_t most_elements(const BuildOptions& options, std::uint32_t triangles) {
-  return options.references == References::budget ? budget_of(options.budget, triangles)
-                                                  : triangles;
+  return may_split(options) ? budget_of(options.budget, triangles) : triangles;
 }
 
 /// One build. `Code` only has to hold the bits of the lattice: it does not change the tree.
@@ -167,7 +177,7 @@ class MortonPipeline {
   void run() {
     Workspace<Code> work;
     backend_.take(work, most_);
-    if (splits()) backend_.take(split_, triangle_count_, most_);
+    if (may_split(options_)) backend_.take(split_, triangle_count_, most_);
     state_ = work.state;
     counts_ = &work.state->counts;
 
@@ -195,7 +205,10 @@ class MortonPipeline {
   [[nodiscard]] Count nodes() const { return {&counts_->nodes, most_}; }
 
   [[nodiscard]] bool balanced() const { return options_.quality == Quality::balanced; }
-  [[nodiscard]] bool splits() const { return options_.references == References::budget; }
+  /// Once validation is done. Where only the device knows: true, and no triangle gets a cut.
+  [[nodiscard]] bool splits() const {
+    return may_split(options_) && backend_.may_exist(Count{&counts_->splits, 1});
+  }
 
   /// Bits that a code may have; the lattice may use fewer, whose digits the sort leaves out.
   [[nodiscard]] std::uint32_t code_bits_bound() const {
@@ -205,15 +218,25 @@ class MortonPipeline {
 
   void validate(Workspace<Code>& work) {
     backend_.stage(Stage::validate);
-    backend_.reduce(Count{nullptr, triangle_count_}, &state_->report,
-                    ValidateTriangle{triangles_, splits() ? split_.boxes : work.boxes});
+    const Count triangles{nullptr, triangle_count_};
+    const ValidateTriangle validate{triangles_, may_split(options_) ? split_.boxes : work.boxes};
+    if (options_.references == References::automatic)
+      backend_.reduce_and_count(triangles, &state_->report, ValidateAndMeasure{validate},
+                                SizeClasses::count, split_.sizes);
+    else
+      backend_.reduce(triangles, &state_->report, validate);
     backend_.for_each(one, PrepareScene{state_, triangles_, options_.code_bits, options_.axis_order,
-                                        options_.invalid_triangles, balanced()});
+                                        options_.invalid_triangles, balanced(), options_.references,
+                                        split_.sizes});
     backend_.raise(&counts_->status, triangles_);
   }
 
   void split(Workspace<Code>& work) {
-    if (!splits()) return;
+    if (!may_split(options_)) return;
+    if (!splits()) {
+      work.boxes = split_.boxes;
+      return;
+    }
     backend_.stage(Stage::split);
     SplitAll<Backend>{triangles_, split_,          &state_->lattice, &state_->report.bounds,
                       counts_,    options_.budget, work.boxes}
@@ -319,7 +342,7 @@ class MortonPipeline {
 
   void list_references(Workspace<Code>& work) {
     backend_.stage(Stage::references);
-    if (options_.references == References::once) {
+    if (options_.references != References::all && !splits()) {
       backend_.for_each(one, ReferenceEachOnce{counts_});
       backend_.allocate_references(listed());
       backend_.for_each(listed(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
@@ -346,7 +369,7 @@ class MortonPipeline {
                           work.levels,
                           work.parents_of_nodes,
                           work.parents_of_leaves,
-                          &state_->coder,
+                          balanced() ? nullptr : &state_->coder,
                           &state_->frame};
       ReferenceAll<Backend>{
           walk,    work.trunk_first, listed(),    trunks(), nodes(),

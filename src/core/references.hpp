@@ -149,12 +149,16 @@ struct CellWalk {
   const std::uint8_t* levels;
   const Parent* parents_of_nodes;
   const Parent* parents_of_leaves;
-  const MortonCoder* coder;
+  const MortonCoder*
+      coder;  ///< null: levels are not those of the lattice, and walks begin at the root
   const SceneFrame* frame;
 
   [[nodiscard]] ZKD_HOST_DEVICE Link start(std::uint32_t i) const {
-    std::uint32_t across = coder->first_level_across(boxes[ids[i]]);
-    if (across == coder->code_bits) across = first_fine_level;
+    std::uint32_t across = 0;
+    if (coder != nullptr) {
+      across = coder->first_level_across(boxes[ids[i]]);
+      if (across == coder->code_bits) across = first_fine_level;
+    }
     Link link = Link::leaf(trunk_of[i]);
     Parent parent = parents_of_leaves[trunk_of[i]];
     while (!parent.is_none() && levels[parent.node()] >= across) {

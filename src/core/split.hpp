@@ -23,6 +23,7 @@
 #include "core/lattice.hpp"
 #include "core/rounding.hpp"
 #include "core/status.hpp"
+#include "core/unevenness.hpp"
 #include "core/verbs.hpp"
 
 namespace zkd::core {
@@ -206,14 +207,15 @@ struct ChooseDensity {
   }
 };
 
-/// Nothing counted yet; what the budget allows.
+/// What the budget allows.
 struct BeginSplitting {
   SplitState* state;
   const BuildCounts* counts;
   float budget;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    state->allowed = budget_of(budget, counts->listed) - counts->listed;
+    state->density = 0.0;
+    state->allowed = counts->splits != 0 ? budget_of(budget, counts->listed) - counts->listed : 0;
   }
 };
 
@@ -440,9 +442,10 @@ struct CloseTrunks {
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const { first[counts->trunks] = counts->listed; }
 };
 
-/// For References::budget.
+/// For References::budget and ::automatic.
 struct SplitWorkspace {
   SplitState* state;
+  std::uint32_t* sizes;   ///< triangles in each of SizeClasses
   Box* boxes;             ///< of triangles
   std::uint8_t* classes;  ///< of triangles
   std::uint32_t* first;   ///< fragment of each triangle
@@ -450,6 +453,7 @@ struct SplitWorkspace {
 
   void lay_out(Arena& arena, std::size_t triangles, std::size_t fragments) {
     state = arena.take<SplitState>(1);
+    sizes = arena.take<std::uint32_t>(SizeClasses::count);
     boxes = arena.take<Box>(triangles);
     classes = arena.take<std::uint8_t>(triangles);
     first = arena.take<std::uint32_t>(triangles);

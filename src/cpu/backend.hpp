@@ -38,6 +38,17 @@ Functor loaded(Functor f) {
   return f;
 }
 
+/// For a histogram alone.
+struct Nothing {
+  void combine(const Nothing&) {}
+};
+template <class Functor>
+struct CountOnly {
+  Functor f;
+  void load() { f = loaded(f); }
+  std::uint32_t operator()(std::uint32_t i, Nothing&) { return f(i); }
+};
+
 class Backend {
  public:
   explicit Backend(const Executor& executor)
@@ -98,22 +109,35 @@ class Backend {
 
   template <class Functor>
   void histogram(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+    Nothing nothing;
+    reduce_and_count(count, &nothing, CountOnly<Functor>{f}, bins, out);
+  }
+
+  template <class T, class Functor>
+  void reduce_and_count(core::Count count, T* out, Functor f, std::uint32_t bins,
+                        std::uint32_t* counts) {
     const std::uint32_t n = size(count);
     const int team = threads_.team(n);
+    Scratch<T> results(*this, static_cast<std::size_t>(team));
     Scratch<std::uint32_t> parts(*this, static_cast<std::size_t>(team) * bins);
-    threads_.divide(n, team, [f, bins, parts = parts.data](Range range, int thread) {
-      Functor g = loaded(f);
-      std::uint32_t* mine = parts + static_cast<std::size_t>(thread) * bins;
-      std::fill(mine, mine + bins, 0);
-      for (std::uint32_t i = range.begin; i < range.end; ++i) {
-        const std::uint32_t bin = g(i);
-        if (bin < bins) ++mine[bin];
-      }
-    });
+    threads_.divide(n, team,
+                    [f, bins, results = results.data, parts = parts.data](Range range, int thread) {
+                      Functor g = loaded(f);
+                      std::uint32_t* mine = parts + static_cast<std::size_t>(thread) * bins;
+                      std::fill(mine, mine + bins, 0);
+                      T result{};
+                      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+                        const std::uint32_t bin = g(i, result);
+                        if (bin < bins) ++mine[bin];
+                      }
+                      results[thread] = result;
+                    });
+    *out = T{};
+    for (int thread = 0; thread < team; ++thread) out->combine(results.data[thread]);
     for (std::uint32_t bin = 0; bin < bins; ++bin) {
-      out[bin] = 0;
+      counts[bin] = 0;
       for (int thread = 0; thread < team; ++thread)
-        out[bin] += parts.data[static_cast<std::size_t>(thread) * bins + bin];
+        counts[bin] += parts.data[static_cast<std::size_t>(thread) * bins + bin];
     }
   }
 
@@ -271,7 +295,7 @@ class Backend {
     if (options.references == References::all)
       most.workspace_bytes += core::bytes_of(core::NotesWorkspace{}, triangles) +
                               core::bytes_of(core::ReferenceWorkspace{}, reference_count);
-    if (options.references == References::budget)
+    if (core::may_split(options))
       most.workspace_bytes += core::bytes_of(core::SplitWorkspace{}, triangle_count, triangles);
     if (options.quality == Quality::balanced)
       most.workspace_bytes +=

@@ -8,7 +8,7 @@
 //
 //   for_each(count, f), climb(leaves, arrivals, f)     as the verbs
 //   histogram(count, f, bins, out)                     likewise, added to what `out` holds
-//   reduce, select, exclusive_scan, segmented_reduce, radix_sort
+//   reduce, reduce_and_count, select, exclusive_scan, segmented_reduce, radix_sort
 //       likewise, with two arguments in front: scratch memory and its size. Without memory (null)
 //       nothing is enqueued, and the size becomes what would be needed.
 //   stage(next)                                        for clocks and profilers
@@ -75,6 +75,15 @@ class Backend {
   void reduce(core::Count count, T* out, Functor f) {
     enqueue_with_scratch(
         [&](void* scratch, std::size_t& bytes) { device_.reduce(scratch, bytes, count, out, f); });
+  }
+
+  template <class T, class Functor>
+  void reduce_and_count(core::Count count, T* out, Functor f, std::uint32_t bins,
+                        std::uint32_t* counts) {
+    for_each(core::Count{nullptr, bins}, core::Fill{counts, 0});
+    enqueue_with_scratch([&](void* scratch, std::size_t& bytes) {
+      device_.reduce_and_count(scratch, bytes, count, out, f, bins, counts);
+    });
   }
 
   template <class Functor>
