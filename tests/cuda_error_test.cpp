@@ -196,9 +196,9 @@ TEST(CudaError, OptionsAndViewsAsOnTheCpu) {
   wrong[0].leaf_size = 0;
   wrong[1].leaf_size = 1025;
   wrong[2].code_bits = 65;
-  wrong[3].references = References::budget;
+  wrong[3].axis_order = static_cast<AxisOrder>(99);
   wrong[4].references = static_cast<References>(99);
-  wrong[5].builder = Builder::sah;
+  wrong[5].sah.test_cost = 0.0F;
   wrong[6].reference_capacity = max_count + 1;
   wrong[7].budget = nan_value;
   Machine machine;
