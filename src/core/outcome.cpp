@@ -48,10 +48,12 @@ Statistics describe(const BuildState& state, const BuildOptions& options, std::u
     flat += state.report.bounds.lo[a] == state.report.bounds.hi[a] ? 1 : 0;
   report(Skip::radix_passes, radix_passes_left_out);
   report(Skip::flat_axes, flat);
-  report(Skip::wide_codes,
-         options.code_bits == 0 && state.report.valid < wide_code_threshold ? 32 : 0);
+  report(Skip::wide_codes, options.code_bits == 0 && options.quality == Quality::fast &&
+                                   state.report.valid < wide_code_threshold
+                               ? 32
+                               : 0);
   report(Skip::recoding, options.recode_crowded && counts.crowded_trunks == 0 ? 1 : 0);
-  report(Skip::compaction, counts.left_out == 0 ? 1 : 0);
+  report(Skip::compaction, state.report.valid == triangles && counts.splits == 0 ? 1 : 0);
   return statistics;
 }
 
