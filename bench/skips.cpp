@@ -17,6 +17,7 @@ const char* unit_of(Skip skip) {
       return "axes";
     case Skip::wide_codes:
       return "bits";
+    case Skip::splitting:
     case Skip::recoding:
     case Skip::compaction:
     case Skip::count:

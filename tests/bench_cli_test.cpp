@@ -109,9 +109,7 @@ TEST_F(BenchCli, BadInputIsOneLineThatNamesTheFile) {
 }
 
 TEST_F(BenchCli, WhatThisVersionDoesNotBuildIsUsage) {
-  expect_error("tetra.obj --references budget", 2, "budget");
   expect_error("tetra.obj --builder wu2011", 2, "wu2011");
-  expect_error("tetra.obj --quality balanced", 2, "balanced");
 }
 
 TEST_F(BenchCli, QualityHighIsTheSahBuilder) {

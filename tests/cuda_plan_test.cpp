@@ -197,15 +197,18 @@ TEST(CudaPlan, PassesAreThoseOfTheirStage) {
   Machine machine;
   const scene::Mesh mesh = scene::soup(1000, 67);
   const Triangles triangles(machine, mesh);
-  machine.stream.forget();
-  (void)build(machine.executor(), triangles.view(),
-              {.references = References::all, .reference_capacity = 10000});
   std::vector<int> passes(static_cast<std::size_t>(Stage::count) + 1);
-  Stage before = Stage::validate;
-  for (const Launch& launch : machine.stream.launches()) {
-    EXPECT_GE(launch.stage, before) << launch.name;
-    before = launch.stage;
-    ++passes[static_cast<std::size_t>(launch.stage)];
+  for (const BuildOptions& options :
+       {BuildOptions{.references = References::all, .reference_capacity = 10000},
+        BuildOptions{.quality = Quality::balanced, .references = References::budget}}) {
+    machine.stream.forget();
+    (void)build(machine.executor(), triangles.view(), options);
+    Stage before = Stage::validate;
+    for (const Launch& launch : machine.stream.launches()) {
+      EXPECT_GE(launch.stage, before) << launch.name;
+      before = launch.stage;
+      ++passes[static_cast<std::size_t>(launch.stage)];
+    }
   }
   EXPECT_EQ(passes.back(), 0) << "after the last stage";
   passes.pop_back();

@@ -17,6 +17,7 @@
 #include "scene/generate.hpp"
 #include "support/meshes.hpp"
 #include "support/simulated_machine.hpp"
+#include "support/tree_kinds.hpp"
 #include "verify/properties.hpp"
 #include "verify/tree_hash.hpp"
 
@@ -97,7 +98,7 @@ TEST_P(CudaSame, ForEveryOption) {
   const test::NamedMesh m = test::small_mesh(GetParam().number, 40);
   Machine machine(static_cast<std::uint64_t>(GetParam().number));
   const Triangles triangles(machine, m.mesh);
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     for (const std::uint32_t leaf_size : {1u, 2u, 4u, 8u, 1024u}) {
       for (const std::uint32_t code_bits : {0u, 6u, 32u, 64u}) {
         for (const AxisOrder order : {AxisOrder::by_extent, AxisOrder::cyclic}) {
@@ -105,8 +106,10 @@ TEST_P(CudaSame, ForEveryOption) {
             SCOPED_TRACE(m.name + ", " + to_string(references) + ", leaf size " +
                          std::to_string(leaf_size) + ", " + std::to_string(code_bits) + " bits, " +
                          to_string(order) + (recode ? "" : ", not coded again"));
+            const bool even = leaf_size == 2 || leaf_size == 8;
             expect_same(machine, triangles.view(), m.mesh.view(),
-                        {.references = references,
+                        {.quality = even ? Quality::balanced : Quality::fast,
+                         .references = references,
                          .leaf_size = leaf_size,
                          .code_bits = code_bits,
                          .axis_order = order,
@@ -131,9 +134,9 @@ TEST(CudaSameTree, ForManySeeds) {
       const test::NamedMesh m = test::small_mesh(kind, 50 + seed);
       Machine machine(seed);
       const Triangles triangles(machine, m.mesh);
-      for (const References references : {References::once, References::all}) {
-        SCOPED_TRACE(m.name + ", " + to_string(references) + ", seed " + std::to_string(seed));
-        expect_same(machine, triangles.view(), m.mesh.view(), skipping(references));
+      for (const BuildOptions& options : test::tree_kinds()) {
+        SCOPED_TRACE(m.name + ", " + test::name_of(options) + ", seed " + std::to_string(seed));
+        expect_same(machine, triangles.view(), m.mesh.view(), options);
         if (HasFailure()) return;
       }
     }
@@ -152,10 +155,11 @@ TEST(CudaSameTree, ForLargerScenes) {
   for (const test::NamedMesh& m : meshes) {
     Machine machine(++seed);
     const Triangles triangles(machine, m.mesh);
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       SCOPED_TRACE(m.name + ", " + to_string(references));
       BuildOptions options = skipping(references);
       options.code_bits = seed % 2 == 0 ? 63 : 0;
+      options.quality = seed % 3 == 0 ? Quality::balanced : Quality::fast;
       expect_same(machine, triangles.view(), m.mesh.view(), options);
     }
   }
@@ -166,7 +170,7 @@ TEST(CudaSameTree, ForAThousandTriangles) {
     Machine machine(n);
     const scene::Mesh mesh = scene::soup(n, n);
     const Triangles triangles(machine, mesh);
-    for (const References references : {References::once, References::all})
+    for (const References references : {References::once, References::budget, References::all})
       expect_same(machine, triangles.view(), mesh.view(), skipping(references));
   }
 }
@@ -196,7 +200,7 @@ TEST(CudaSameTree, NothingToBuild) {
                                     {"all NaN", not_finite},
                                     {"all of zero area", zero_area}};
   for (const test::NamedMesh& m : meshes) {
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       for (std::uint64_t seed = 0; seed < 3; ++seed) {
         SCOPED_TRACE(m.name + ", " + to_string(references));
         Machine machine(seed);
@@ -217,7 +221,7 @@ TEST(CudaSameTree, SomeAreNotFinite) {
     for (int i = 0; i < 200; ++i) mesh.positions[random.below(4500)].y = nan_value;
     Machine machine(seed);
     const Triangles triangles(machine, mesh);
-    for (const References references : {References::once, References::all})
+    for (const References references : {References::once, References::budget, References::all})
       expect_same(machine, triangles.view(), mesh.view(), skipping(references));
   }
 }
@@ -241,7 +245,7 @@ TEST(CudaSameTree, FromHostAndDeviceMemory) {
     positions_there.positions = on_device.view().positions;
     TriangleView indices_there = mesh.view();
     indices_there.indices = on_device.view().indices;
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       expect_same(machine, on_device.view(), mesh.view(), skipping(references));
       expect_same(machine, mesh.view(), mesh.view(), skipping(references));
       expect_same(machine, positions_there, mesh.view(), skipping(references));
@@ -270,7 +274,7 @@ TEST(CudaSameTree, WhateverTheFormOfTheView) {
     const simulated::Array<float> uploaded(std::span<const float>(wide), machine.aside());
     TriangleView on_device = strided;
     on_device.positions = uploaded.data();
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       expect_same(machine, soup, mesh.view(), skipping(references));
       expect_same(machine, strided, mesh.view(), skipping(references));
       expect_same(machine, on_device, mesh.view(), skipping(references));
@@ -285,7 +289,7 @@ TEST(CudaSameTree, RaysFindTheSame) {
     const test::NamedMesh m = test::small_mesh(kind, 47);
     const std::vector<Ray> rays = scene::rays_at_features(m.mesh, 300, 48);
     Machine machine(static_cast<std::uint64_t>(kind));
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       const Tree tree = on_cpu(m.mesh.view(), skipping(references));
       std::vector<Hit> want(rays.size());
       closest_hit(cpu::Executor{}, tree.view(), m.mesh.view(), rays, want);
@@ -307,7 +311,7 @@ TEST(CudaSameTree, ToTheDeviceAndBack) {
   std::uint64_t seed = 0;
   for (const test::NamedMesh& m : meshes) {
     Machine machine(++seed);
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       SCOPED_TRACE(m.name + ", " + to_string(references));
       BuildOptions options = skipping(references);
       options.measure_quality = true;

@@ -62,7 +62,7 @@ void expect_same(const std::vector<Hit>& got, std::span<const Hit> want) {
 // ---- Visitors -----------------------------------------------------------------------------------
 
 TEST(HitsCpu, StopsAfterEachHit) {
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     const Scene s(20, references);
     for (const Intersector intersector : every_intersector) {
       for (const Ray& ray : s.rays) {
@@ -154,7 +154,7 @@ TEST(HitsCpu, WhatAVisitorThrowsPassesThrough) {
 // ---- Threads ------------------------------------------------------------------------------------
 
 TEST(HitsCpu, NumberOfThreadsAndInstructions) {
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     const Scene s(3001, references);
     std::vector<std::vector<Hit>> want;
     for (const Ray& ray : s.rays) want.push_back(s.all_hits(ray, Intersector::watertight));

@@ -196,7 +196,7 @@ TEST_P(HitsInOrder, OfExactAreTheOracles) {
   const TriangleView triangles = m.mesh.view();
   const verify::Oracle oracle(triangles);
   const auto most = static_cast<std::uint32_t>(m.mesh.faces.size()) + 1;
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     SCOPED_TRACE(m.name + ", " + to_string(references));
     const test::PlatformTree tree = make_tree({"", {.references = references}}, triangles);
     const std::vector<Ray> rays = rays_at(m.mesh, tree.host().view(), 5, 60);
@@ -275,7 +275,7 @@ TEST(HitsInOrderOfManyHits, OnAHundredThousandIdenticalTriangles) {
   const glm::vec3 c = mesh.positions[mesh.faces[0].z];
   const glm::vec3 middle = (a + b + c) / 3.0F;
   const Ray ray = scene::ray_between(middle + glm::vec3(0.5F, 0.75F, 1.0F), middle);
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     SCOPED_TRACE(to_string(references));
     const test::PlatformTree tree = make_tree({"", {.references = references}}, mesh.view());
     const Lists lists = walked(tree, std::span(&ray, 1), n + 1);

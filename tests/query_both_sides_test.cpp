@@ -71,7 +71,7 @@ class QueryBothSides : public testing::TestWithParam<test::MeshKind> {};
 TEST_P(QueryBothSides, GiveTheSameAnswers) {
   for (std::uint64_t seed = 200; seed < 204; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references));
       BuildOptions options;
       options.references = references;
@@ -87,7 +87,7 @@ INSTANTIATE_TEST_SUITE_P(Every, QueryBothSides, testing::ValuesIn(test::every_me
                          [](const auto& kind) { return kind.param.name(); });
 
 TEST(QueryBothSides, GiveTheSameAnswersForLargerScenes) {
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     for (const scene::Mesh& mesh :
          {scene::soup(5000, 210), scene::sphere(4), scene::small_in_large(3000, 1e6F, 211)}) {
       EXPECT_GT(expect_same_on_both_sides(mesh, {.references = references}, 212), 200u)
@@ -101,7 +101,7 @@ TEST(QueryBothSides, GiveTheSameAnswersForLargerScenes) {
 TEST(QueryBothSides, KnowTheSameOfATree) {
   for (int kind = 0; kind < test::small_mesh_kinds; ++kind) {
     const test::NamedMesh m = test::small_mesh(kind, 213);
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       SCOPED_TRACE(m.name + ", " + to_string(references));
       const BuildOptions options{.references = references,
                                  .invalid_triangles = InvalidTriangles::skip,

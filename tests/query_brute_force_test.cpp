@@ -69,6 +69,8 @@ void expect_same_answers(const test::PlatformTree& tree, const TriangleView& tri
 BuildOptions options_for(References references, std::uint64_t seed) {
   BuildOptions options;
   options.references = references;
+  options.quality = seed % 2 == 1 ? Quality::balanced : Quality::fast;
+  options.budget = 1.0F + 0.5F * static_cast<float>(seed % 5);
   options.leaf_size = seed % 3 == 0 ? 1 : seed % 3 == 1 ? 4 : 9;
   options.code_bits = seed % 4 == 0 ? 64 : seed % 4 == 1 ? 12 : 0;
   options.invalid_triangles = InvalidTriangles::skip;
@@ -81,7 +83,7 @@ TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
   Count count;
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references));
       const test::PlatformTree tree(m.mesh.view(), options_for(references, seed));
       test::RayMaker maker(m.mesh, tree.host().view(), seed);
@@ -107,7 +109,7 @@ TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
 TEST_P(QueryBruteForce, EndsOfTheIntervalAtTheHit) {
   Count count;
   const test::NamedMesh m = test::small_mesh(GetParam().number, 50);
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     SCOPED_TRACE(m.name + ", " + to_string(references));
     const test::PlatformTree tree(m.mesh.view(), options_for(references, 50));
     const std::vector<Ray> whole = test::RayMaker(m.mesh, tree.host().view(), 50).all_kinds(400);
@@ -136,7 +138,7 @@ INSTANTIATE_TEST_SUITE_P(Every, QueryBruteForce, testing::ValuesIn(test::every_m
 
 TEST(QueryBruteForce, LargerScenes) {
   Count count;
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     for (const scene::Mesh& mesh : {scene::soup(5000, 60), scene::sphere(4), scene::grid(7),
                                     scene::small_in_large(3000, 1e6F, 60), scene::fan(5000)}) {
       const test::PlatformTree tree(mesh.view(), {.references = references});

@@ -26,7 +26,7 @@ TEST(QueryFound, FarOriginsOfScenesAwayFromZero) {
         corners.push_back(at + glm::vec3(random.unit(), random.unit(), random.unit()));
     }
     const TriangleView view{std::span<const glm::vec3>(corners)};
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       const test::PlatformTree tree(view, {.references = references, .leaf_size = 1});
       std::vector<Ray> rays;
       for (int i = 0; i < 4000; ++i) {

@@ -49,7 +49,8 @@ class QueryRules : public testing::TestWithParam<References> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Every, QueryRules, testing::Values(References::once, References::all),
+INSTANTIATE_TEST_SUITE_P(Every, QueryRules,
+                         testing::Values(References::once, References::budget, References::all),
                          [](const auto& policy) { return std::string(to_string(policy.param)); });
 
 // Four walls across the z axis at 1, 2, 3, 4.

@@ -18,6 +18,7 @@
 #include "support/memory.hpp"
 #include "support/meshes.hpp"
 #include "support/refusing_new.hpp"
+#include "support/tree_kinds.hpp"
 #include "verify/tree_hash.hpp"
 
 namespace zkd {
@@ -48,14 +49,14 @@ BuildOptions options_for(References references, std::uint32_t code_bits = 0) {
 
 // Each way to build that takes its memory in another way.
 std::vector<BuildOptions> ways() {
-  std::vector<BuildOptions> all = {options_for(References::once), options_for(References::all),
-                                   options_for(References::all)};
+  std::vector<BuildOptions> all = test::tree_kinds();
+  all.push_back(options_for(References::all));
   all.back().builder = Builder::sah;
   return all;
 }
 
 std::string name(const BuildOptions& way) {
-  return std::string(to_string(way.builder)) + " " + to_string(way.references);
+  return std::string(to_string(way.builder)) + " " + test::name_of(way);
 }
 
 // The default resource refuses everything while this lives.
@@ -142,14 +143,14 @@ TEST(TreeMemory, NoResourceMeansTheDefaultOne) {
 
 TEST(TreeMemory, NeverMoreThanWasAskedForBeforehand) {
   for (const test::NamedMesh& m : meshes()) {
-    for (const References references : {References::once, References::all}) {
+    for (BuildOptions options : test::tree_kinds()) {
       for (const std::uint32_t code_bits : {0u, 32u, 64u}) {
         for (int threads = 1; threads <= 4; ++threads) {
-          SCOPED_TRACE(m.name + ", " + to_string(references) + ", " + std::to_string(code_bits) +
+          SCOPED_TRACE(m.name + ", " + test::name_of(options) + ", " + std::to_string(code_bits) +
                        " bits, " + std::to_string(threads) + " threads");
           CountingResource memory;
           const cpu::Executor executor{.threads = threads, .memory = &memory};
-          const BuildOptions options = options_for(references, code_bits);
+          options.code_bits = code_bits;
           const Tree tree = build(executor, m.mesh.view(), options);
           const Statistics& s = tree.statistics();
           const MemoryRequirement need =

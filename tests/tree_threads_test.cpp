@@ -28,7 +28,7 @@ constexpr BuildOptions skipping(References references) {
 
 TEST(TreeThreads, BuiltBySeveralThreadsAtOnce) {
   const scene::Mesh mesh = scene::soup(20000, 24);
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     const std::string want =
         tree_hash(build(cpu::Executor{}, mesh.view(), skipping(references)).view());
     std::vector<std::string> got(4);
@@ -50,7 +50,7 @@ TEST(TreeThreads, BuiltBySeveralThreadsAtOnce) {
 // spans.
 TEST(TreeThreads, BuildsAndQueriesAtOnce) {
   const scene::Mesh mesh = scene::soup(20000, 25);
-  for (const References references : {References::once, References::all}) {
+  for (const References references : {References::once, References::budget, References::all}) {
     const Tree tree = build(cpu::Executor{}, mesh.view(), skipping(references));
     const std::string want = tree_hash(tree.view());
     const std::vector<Ray> rays = scene::rays_at_features(mesh, 2000, 26);

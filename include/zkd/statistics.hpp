@@ -17,8 +17,10 @@ namespace zkd {
 /// references (from the parts of all threads to one tree).
 enum class Stage : std::uint8_t {
   validate,          ///< checks, triangle boxes, scene box, lattice
+  split,             ///< triangles cut into fragments, with References::budget
   encode,            ///< Morton codes
   sort,              ///< stable radix sort on the codes
+  clusters,          ///< the upper part of the tree by SAH, with Quality::balanced
   recode,            ///< crowded trunks coded again in their own box
   trunks,            ///< ranges of codes that become leaves
   essential_nodes,   ///< where neighbouring trunks first differ
@@ -37,6 +39,7 @@ enum class Skip : std::uint8_t {
   radix_passes,  ///< digits equal in every code; amount: passes left out
   flat_axes,     ///< axes without extent get no bits; amount: axes
   wide_codes,    ///< few triangles: 32-bit codes instead of 64; amount: bits
+  splitting,     ///< even boxes: no triangle is split, with References::automatic; amount: 1
   recoding,      ///< no crowded trunk, no second round; amount: 1
   compaction,    ///< no triangle left out, ids need no renumbering; amount: 1
   count,

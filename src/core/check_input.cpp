@@ -66,10 +66,6 @@ void check_ranges(const BuildOptions& options) {
 /// What this version does not have.
 void check_supported(const BuildOptions& options) {
   if (options.builder == Builder::wu2011) unsupported("builder", to_string(options.builder));
-  if (builder_for(options) != Builder::morton) return;
-  if (options.quality != Quality::fast) unsupported("quality", to_string(options.quality));
-  if (options.references == References::budget || options.references == References::automatic)
-    unsupported("references", to_string(options.references));
 }
 
 }  // namespace

@@ -48,26 +48,30 @@ const char* cpu::to_string(InstructionSet value) noexcept {
   return name_of(std::array{"auto", "portable", "avx2"}, value);
 }
 const char* to_string(Stage stage) noexcept {
-  return name_of(std::array{"validate", "encode", "sort", "recode", "trunks", "essential_nodes",
-                            "path_compression", "split_planes", "references", "tight_boxes"},
+  return name_of(std::array{"validate", "split", "encode", "sort", "clusters", "recode", "trunks",
+                            "essential_nodes", "path_compression", "split_planes", "references",
+                            "tight_boxes"},
                  stage);
 }
 const char* to_string(Skip skip) noexcept {
-  return name_of(std::array{"radix passes", "flat axes", "wide codes", "recoding", "compaction"},
-                 skip);
+  return name_of(
+      std::array{"radix passes", "flat axes", "wide codes", "splitting", "recoding", "compaction"},
+      skip);
 }
 const char* reason(Skip skip, bool taken) noexcept {
-  return taken
-             ? name_of(
-                   std::array{"every code has the same digit there", "nothing extends along them",
-                              "few triangles: short codes tell them apart", "no crowded trunk",
-                              "no triangle left out"},
-                   skip)
-             : name_of(
-                   std::array{"codes differ in every digit", "the scene extends along every axis",
-                              "many triangles: short codes would crowd them", "trunks are crowded",
-                              "triangles were left out, the others have to close up"},
-                   skip);
+  return taken ? name_of(
+                     std::array{"every code has the same digit there", "nothing extends along them",
+                                "few triangles: short codes tell them apart",
+                                "boxes of much the same size: splitting would not pay",
+                                "no crowded trunk", "no triangle left out"},
+                     skip)
+               : name_of(
+                     std::array{"codes differ in every digit", "the scene extends along every axis",
+                                "many triangles: short codes would crowd them",
+                                "boxes of very different sizes: triangles were split",
+                                "trunks are crowded",
+                                "triangles were left out, the others have to close up"},
+                     skip);
 }
 
 }  // namespace zkd

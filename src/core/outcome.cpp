@@ -46,13 +46,16 @@ Statistics describe(const BuildState& state, const BuildOptions& options, std::u
   std::uint32_t flat = 0;
   for (int a = 0; a < 3; ++a)
     flat += state.report.bounds.lo[a] == state.report.bounds.hi[a] ? 1 : 0;
+  const bool may_be_narrow = options.code_bits == 0 && options.quality == Quality::fast;
   report(Skip::radix_passes, radix_passes_left_out != 0, radix_passes_left_out);
   report(Skip::flat_axes, true, flat);
-  report(Skip::wide_codes, options.code_bits == 0,
-         options.code_bits == 0 && state.report.valid < wide_code_threshold ? 32 : 0);
+  report(Skip::wide_codes, may_be_narrow,
+         may_be_narrow && state.report.valid < wide_code_threshold ? 32 : 0);
+  report(Skip::splitting, options.references == References::automatic,
+         options.references == References::automatic && counts.splits == 0 ? 1 : 0);
   report(Skip::recoding, options.recode_crowded,
          options.recode_crowded && counts.crowded_trunks == 0 ? 1 : 0);
-  report(Skip::compaction, true, counts.left_out == 0 ? 1 : 0);
+  report(Skip::compaction, true, state.report.valid == triangles && counts.splits == 0 ? 1 : 0);
   return statistics;
 }
 

@@ -30,6 +30,7 @@ namespace core {
 /// Whether codes are kept in 64 bits. More room than bits changes nothing in the tree, so the count
 /// given may decide it, invalid triangles included.
 inline bool needs_wide_codes(const BuildOptions& options, std::uint64_t triangle_count) {
+  if (options.quality == Quality::balanced) return true;  // a path stands before the code
   return choose_code_bits(options.code_bits, static_cast<std::uint32_t>(triangle_count)) > 32;
 }
 
@@ -38,6 +39,8 @@ inline BuildOptions used_options(const BuildState& state, const BuildOptions& op
                                  Backend backend) {
   BuildOptions used = options;
   used.backend = backend;
+  if (used.references == References::automatic)
+    used.references = state.counts.splits != 0 ? References::budget : References::once;
   used.code_bits = choose_code_bits(options.code_bits, state.report.valid);
   return used;
 }

@@ -18,6 +18,7 @@
 
 #include "core/arena.hpp"
 #include "core/boxes.hpp"
+#include "core/clusters.hpp"
 #include "core/compress.hpp"
 #include "core/essential.hpp"
 #include "core/frame.hpp"
@@ -27,6 +28,7 @@
 #include "core/planes.hpp"
 #include "core/recode.hpp"
 #include "core/references.hpp"
+#include "core/split.hpp"
 #include "core/status.hpp"
 #include "core/trunks.hpp"
 #include "core/validate.hpp"
@@ -109,12 +111,21 @@ struct PrepareScene {
   std::uint32_t code_bits_asked;
   AxisOrder order;
   InvalidTriangles invalid;
+  bool clusters;
+  References references;
+  const std::uint32_t* sizes;  ///< for References::automatic
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
     admit_scene(*state, triangles, invalid);
-    state->lattice = make_lattice(widen(state->report.bounds),
-                                  choose_code_bits(code_bits_asked, state->report.valid), order,
-                                  state->frame.finest);
+    const std::uint32_t valid = state->report.valid;
+    const bool splits = references == References::automatic
+                            ? is_uneven(sizes, state->report.bounds, valid)
+                            : references == References::budget;
+    state->counts.splits = splits ? 1 : 0;
+    std::uint32_t code_bits = choose_code_bits(code_bits_asked, valid);
+    if (clusters) code_bits = code_bits_below_path(code_bits, valid);
+    state->lattice =
+        make_lattice(widen(state->report.bounds), code_bits, order, state->frame.finest);
     state->coder = MortonCoder(state->lattice);
   }
 };
@@ -141,6 +152,16 @@ struct WriteHeader {
   }
 };
 
+/// Whether triangles may have to be split; with References::automatic the scene decides.
+inline bool may_split(const BuildOptions& options) {
+  return options.references == References::budget || options.references == References::automatic;
+}
+
+/// What is coded and sorted: triangles, or at most so many fragments of them.
+inline std::uint32_t most_elements(const BuildOptions& options, std::uint32_t triangles) {
+  return may_split(options) ? budget_of(options.budget, triangles) : triangles;
+}
+
 /// One build. `Code` only has to hold the bits of the lattice: it does not change the tree.
 template <class Code, class Backend>
 class MortonPipeline {
@@ -149,18 +170,22 @@ class MortonPipeline {
       : backend_(backend),
         triangles_(triangles),
         options_(options),
-        triangle_count_(static_cast<std::uint32_t>(triangles.triangle_count)) {}
+        triangle_count_(static_cast<std::uint32_t>(triangles.triangle_count)),
+        most_(most_elements(options, triangle_count_)) {}
 
   /// Runs all stages. The tree's arrays are the backend's.
   void run() {
     Workspace<Code> work;
-    backend_.take(work, triangle_count_);
+    backend_.take(work, most_);
+    if (may_split(options_)) backend_.take(split_, triangle_count_, most_);
     state_ = work.state;
     counts_ = &work.state->counts;
 
     validate(work);                              // 1 validate.hpp, 2 lattice.hpp
+    split(work);                                 //   split.hpp: with a budget of references
     encode(work);                                // 3 morton.hpp
     sort(work);                                  // 4 a verb of the backend
+    arrange(work);                               //   clusters.hpp: for Quality::balanced
     const SortedKeys<Code> keys = recode(work);  // 5 recode.hpp
     find_trunks(work, keys);                     // 6 trunks.hpp
     find_essential_nodes(work);                  // 7 essential.hpp
@@ -174,10 +199,16 @@ class MortonPipeline {
   [[nodiscard]] const BuildState* state() const { return state_; }
 
  private:
-  [[nodiscard]] Count given() const { return {&counts_->given, triangle_count_}; }
-  [[nodiscard]] Count listed() const { return {&counts_->listed, triangle_count_}; }
-  [[nodiscard]] Count trunks() const { return {&counts_->trunks, triangle_count_}; }
-  [[nodiscard]] Count nodes() const { return {&counts_->nodes, triangle_count_}; }
+  [[nodiscard]] Count given() const { return {&counts_->given, most_}; }
+  [[nodiscard]] Count listed() const { return {&counts_->listed, most_}; }
+  [[nodiscard]] Count trunks() const { return {&counts_->trunks, most_}; }
+  [[nodiscard]] Count nodes() const { return {&counts_->nodes, most_}; }
+
+  [[nodiscard]] bool balanced() const { return options_.quality == Quality::balanced; }
+  /// Once validation is done. Where only the device knows: true, and no triangle gets a cut.
+  [[nodiscard]] bool splits() const {
+    return may_split(options_) && backend_.may_exist(Count{&counts_->splits, 1});
+  }
 
   /// Bits that a code may have; the lattice may use fewer, whose digits the sort leaves out.
   [[nodiscard]] std::uint32_t code_bits_bound() const {
@@ -187,17 +218,35 @@ class MortonPipeline {
 
   void validate(Workspace<Code>& work) {
     backend_.stage(Stage::validate);
-    backend_.reduce(Count{nullptr, triangle_count_}, &state_->report,
-                    ValidateTriangle{triangles_, work.boxes});
+    const Count triangles{nullptr, triangle_count_};
+    const ValidateTriangle validate{triangles_, may_split(options_) ? split_.boxes : work.boxes};
+    if (options_.references == References::automatic)
+      backend_.reduce_and_count(triangles, &state_->report, ValidateAndMeasure{validate},
+                                SizeClasses::count, split_.sizes);
+    else
+      backend_.reduce(triangles, &state_->report, validate);
     backend_.for_each(one, PrepareScene{state_, triangles_, options_.code_bits, options_.axis_order,
-                                        options_.invalid_triangles});
+                                        options_.invalid_triangles, balanced(), options_.references,
+                                        split_.sizes});
     backend_.raise(&counts_->status, triangles_);
+  }
+
+  void split(Workspace<Code>& work) {
+    if (!may_split(options_)) return;
+    if (!splits()) {
+      work.boxes = split_.boxes;
+      return;
+    }
+    backend_.stage(Stage::split);
+    SplitAll<Backend>{triangles_, split_,          &state_->lattice, &state_->report.bounds,
+                      counts_,    options_.budget, work.boxes}
+        .run(backend_);
   }
 
   void encode(Workspace<Code>& work) {
     backend_.stage(Stage::encode);
     std::uint32_t* ids = work.sort.values;
-    if (backend_.may_exist(Count{&counts_->left_out, triangle_count_}))
+    if (backend_.may_exist(Count{&counts_->left_out, most_}))
       backend_.select(given(), IsListed{work.boxes}, ids, &counts_->listed);
     else
       backend_.for_each(listed(), Number{ids});
@@ -210,9 +259,23 @@ class MortonPipeline {
     work.sort = backend_.radix_sort(work.sort, listed(), code_bits_bound());
   }
 
+  void arrange(Workspace<Code>& work) {
+    if constexpr (sizeof(Code) == 8) {
+      if (!balanced()) return;
+      backend_.stage(Stage::clusters);
+      backend_.take(clusters_, 1u);
+      ArrangeClusters<Backend> stage{work.boxes,     &state_->lattice,
+                                     &state_->coder, &state_->report.valid,
+                                     listed(),       clusters_.state};
+      work.sort = stage.run(backend_, work.sort);
+      cluster_planes_ = stage.planes();
+    }
+  }
+
   SortedKeys<Code> recode(Workspace<Code>& work) {
     backend_.stage(Stage::recode);
-    SortedKeys<Code> keys{work.sort.keys, nullptr, &state_->lattice.code_bits};
+    SortedKeys<Code> keys{work.sort.keys, nullptr,
+                          balanced() ? &clusters_.state->key_bits : &state_->lattice.code_bits};
     if (!options_.recode_crowded) return keys;
     SecondRound<Code, Backend> round{work.boxes,
                                      work.sort.keys,
@@ -261,24 +324,38 @@ class MortonPipeline {
     Node* nodes = backend_.nodes();
     const CrowdByPosition crowd{work.trunk_first, recoded_.first, &counts_->crowded_trunks,
                                 recoded_.lattices, recoded_.coders};
-    backend_.for_each(this->nodes(),
-                      PlaceSplitPlane<CrowdByPosition>{
-                          work.trunk_keys,
-                          work.levels,
-                          &state_->lattice,
-                          &state_->coder,
-                          crowd,
-                          &state_->frame.scale,
-                          {&nodes->axis, &nodes->plane, sizeof(Node) / sizeof(float)}});
+    const auto place = [&](const auto& scene) {
+      using Scene = std::decay_t<decltype(scene)>;
+      backend_.for_each(this->nodes(),
+                        PlaceSplitPlane<Scene, CrowdByPosition>{
+                            work.trunk_keys,
+                            work.levels,
+                            scene,
+                            crowd,
+                            &state_->frame.scale,
+                            {&nodes->axis, &nodes->plane, sizeof(Node) / sizeof(float)}});
+    };
+    if constexpr (sizeof(Code) == 8)
+      if (balanced()) return place(cluster_planes_);
+    place(LatticePlanes{&state_->lattice, &state_->coder});
   }
 
   void list_references(Workspace<Code>& work) {
     backend_.stage(Stage::references);
-    if (options_.references == References::once) {
+    if (options_.references != References::all && !splits()) {
       backend_.for_each(one, ReferenceEachOnce{counts_});
       backend_.allocate_references(listed());
       backend_.for_each(listed(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
       backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.trunk_first, backend_.leaf_offsets()});
+    } else if (splits()) {
+      backend_.for_each(one, CloseTrunks{counts_, work.trunk_first});
+      const TrunkOfFragments fragments{work.sort.values, work.trunk_first, split_.owners,
+                                       options_.leaf_size};
+      backend_.exclusive_scan(trunks(), CountOwners{fragments}, backend_.leaf_offsets(),
+                              &counts_->references);
+      backend_.allocate_references(Count{&counts_->references, most_});
+      backend_.for_each(trunks(),
+                        ListOwners{fragments, backend_.leaf_offsets(), backend_.references()});
     } else {
       // Memory that earlier stages are done with.
       auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);
@@ -292,7 +369,7 @@ class MortonPipeline {
                           work.levels,
                           work.parents_of_nodes,
                           work.parents_of_leaves,
-                          &state_->coder,
+                          balanced() ? nullptr : &state_->coder,
                           &state_->frame};
       ReferenceAll<Backend>{
           walk,    work.trunk_first, listed(),    trunks(), nodes(),
@@ -306,7 +383,8 @@ class MortonPipeline {
     backend_.stage(Stage::tight_boxes);
     backend_.for_each(nodes(), Fill{work.arrivals, 0});
     backend_.climb(trunks(), work.arrivals,
-                   TightBoxes{work.boxes, backend_.leaf_offsets(), backend_.references(),
+                   TightBoxes{work.boxes, splits() ? work.trunk_first : backend_.leaf_offsets(),
+                              splits() ? work.sort.values : backend_.references(),
                               work.parents_of_nodes, work.parents_of_leaves, &state_->frame,
                               options_.references == References::all, backend_.nodes()});
     backend_.for_each(one, WriteHeader{state_, backend_.header()});
@@ -316,9 +394,13 @@ class MortonPipeline {
   const TriangleView& triangles_;
   const BuildOptions& options_;
   std::uint32_t triangle_count_;
+  std::uint32_t most_;
   BuildState* state_ = nullptr;
   BuildCounts* counts_ = nullptr;
   RecodeWorkspace recoded_{};
+  SplitWorkspace split_{};
+  ClusterRecord clusters_{};
+  ClusterPlanes cluster_planes_{};
 };
 
 }  // namespace zkd::core

@@ -31,6 +31,16 @@ ZKD_HOST_DEVICE inline SplitPlane split_plane(const Lattice& lattice, const Mort
   return {axis, plane_position(lattice, static_cast<int>(axis), k)};
 }
 
+/// Planes of the scene's lattice.
+struct LatticePlanes {
+  const Lattice* lattice;
+  const MortonCoder* coder;
+
+  [[nodiscard]] ZKD_HOST_DEVICE SplitPlane plane(std::uint64_t above, std::uint32_t level) const {
+    return split_plane(*lattice, *coder, above, level);
+  }
+};
+
 /// The lattice of the crowded trunk that a trunk came from, found by where both begin.
 struct CrowdByPosition {
   const std::uint32_t* first;          ///< position of each trunk's first triangle
@@ -66,12 +76,11 @@ struct PlaneWriter {
 };
 
 /// Essential node j: its plane, times `scale`.
-template <class Crowd>
+template <class Scene, class Crowd>
 struct PlaceSplitPlane {
   const TrunkKey* trunk_keys;
   const std::uint8_t* levels;
-  const Lattice* lattice;
-  const MortonCoder* coder;
+  Scene scene;
   Crowd crowd;
   const double* scale;
   PlaneWriter writer;
@@ -81,7 +90,7 @@ struct PlaceSplitPlane {
     const std::uint32_t level = levels[node];
     SplitPlane plane;
     if (level < first_fine_level) {
-      plane = split_plane(*lattice, *coder, above.code, level);
+      plane = scene.plane(above.code, level);
     } else {
       // Second-round codes are aligned to the left of 64 bits too.
       plane = crowd.plane(node + 1, above.fine, level - first_fine_level);

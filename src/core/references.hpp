@@ -23,8 +23,8 @@ namespace zkd::core {
 
 /// Relative slack of the overlap test: a triangle is taken to touch a cell that it misses by less
 /// than about this times the largest coordinate (of a sliver: times as much more as the products
-/// cancel that make its normal). Rounding moves a projection by less than 2^-50 of the products that
-/// make it, so a triangle that touches is never lost.
+/// cancel that make its normal). Rounding moves a projection by less than 2^-50 of the products
+/// that make it, so a triangle that touches is never lost.
 inline constexpr double overlap_slack = 4.0e-14;
 
 /// A triangle in tree space, ready for overlap tests with many cells (Akenine-Moller: Fast 3D
@@ -149,12 +149,16 @@ struct CellWalk {
   const std::uint8_t* levels;
   const Parent* parents_of_nodes;
   const Parent* parents_of_leaves;
-  const MortonCoder* coder;
+  const MortonCoder*
+      coder;  ///< null: levels are not those of the lattice, and walks begin at the root
   const SceneFrame* frame;
 
   [[nodiscard]] ZKD_HOST_DEVICE Link start(std::uint32_t i) const {
-    std::uint32_t across = coder->first_level_across(boxes[ids[i]]);
-    if (across == coder->code_bits) across = first_fine_level;
+    std::uint32_t across = 0;
+    if (coder != nullptr) {
+      across = coder->first_level_across(boxes[ids[i]]);
+      if (across == coder->code_bits) across = first_fine_level;
+    }
     Link link = Link::leaf(trunk_of[i]);
     Parent parent = parents_of_leaves[trunk_of[i]];
     while (!parent.is_none() && levels[parent.node()] >= across) {

@@ -40,12 +40,14 @@ struct BuildCounts {
   std::uint32_t trunks = 0;
   std::uint32_t nodes = 0;
   std::uint32_t references = 0;
+  std::uint32_t fragments = 0;  ///< of References::budget, places that stay empty included
+  std::uint32_t splits = 0;     ///< 1: triangles are split
   std::uint64_t references_needed = 0;
 
   ZKD_HOST_DEVICE void fail(ErrorCode code, std::uint64_t offender, std::uint64_t first = 0,
                             std::uint64_t second = 0) {
     status = {1, code, offender, {first, second}};
-    given = listed = left_out = trunks = nodes = references = 0;
+    given = listed = left_out = trunks = nodes = references = fragments = 0;
   }
 };
 

@@ -11,11 +11,13 @@
 //   stage(Stage)                       names the work that follows, for clocks and profilers
 //   for_each(count, f)                 f(i)
 //   reduce(count, &out, f)             out = T{}; f(i, out) for all i, in any grouping (T::combine)
-//   select(count, f, out, &total)      the i for which f(i), in order
-//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
-//   segmented_reduce(segments, offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s])
-//   radix_sort(buffers, count, bits)   stable; says in which of the buffers the result is
-//   climb(leaves, arrivals, f)         f.begin(leaf), then f.rise(node) for each node whose second
+//   reduce_and_count(count, &out, f, bins, counts)      both of these at once: f(i, out) names the
+//   bin select(count, f, out, &total)      the i for which f(i), in order histogram(count, f, bins,
+//   out)     out[b] = how many i have f(i) = b, below bins (most_bins at most)
+//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1) segmented_reduce(segments,
+//   offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s]) radix_sort(buffers, count, bits)
+//   stable; says in which of the buffers the result is climb(leaves, arrivals, f) f.begin(leaf),
+//   then f.rise(node) for each node whose second
 //                                      child has arrived (counted in `arrivals`, zero before); both
 //                                      return the way up. f.prefetch(leaf) may be called before
 //   may_exist(count), size(count)      what the host knows; where only the device does: true, bound
@@ -51,6 +53,9 @@ struct Count {
 
 /// A pass over a single element: work for one thread.
 inline constexpr Count one{nullptr, 1};
+
+/// A histogram may have as many: they fit into the shared memory of a block.
+inline constexpr std::uint32_t most_bins = 1024;
 
 /// Functors that have to be made ready (see above).
 template <class Functor>

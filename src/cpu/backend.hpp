@@ -39,6 +39,17 @@ Functor loaded(Functor f) {
   return f;
 }
 
+/// For a histogram alone.
+struct Nothing {
+  void combine(const Nothing&) {}
+};
+template <class Functor>
+struct CountOnly {
+  Functor f;
+  void load() { f = loaded(f); }
+  std::uint32_t operator()(std::uint32_t i, Nothing&) { return f(i); }
+};
+
 class Backend {
  public:
   explicit Backend(const Executor& executor)
@@ -95,6 +106,40 @@ class Backend {
       end += selected.data[thread];
     }
     *total = end;
+  }
+
+  template <class Functor>
+  void histogram(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+    Nothing nothing;
+    reduce_and_count(count, &nothing, CountOnly<Functor>{f}, bins, out);
+  }
+
+  template <class T, class Functor>
+  void reduce_and_count(core::Count count, T* out, Functor f, std::uint32_t bins,
+                        std::uint32_t* counts) {
+    const std::uint32_t n = size(count);
+    const int team = threads_.team(n);
+    Scratch<T> results(*this, static_cast<std::size_t>(team));
+    Scratch<std::uint32_t> parts(*this, static_cast<std::size_t>(team) * bins);
+    threads_.divide(n, team,
+                    [f, bins, results = results.data, parts = parts.data](Range range, int thread) {
+                      Functor g = loaded(f);
+                      std::uint32_t* mine = parts + static_cast<std::size_t>(thread) * bins;
+                      std::fill(mine, mine + bins, 0);
+                      T result{};
+                      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+                        const std::uint32_t bin = g(i, result);
+                        if (bin < bins) ++mine[bin];
+                      }
+                      results[thread] = result;
+                    });
+    *out = T{};
+    for (int thread = 0; thread < team; ++thread) out->combine(results.data[thread]);
+    for (std::uint32_t bin = 0; bin < bins; ++bin) {
+      counts[bin] = 0;
+      for (int thread = 0; thread < team; ++thread)
+        counts[bin] += parts.data[static_cast<std::size_t>(thread) * bins + bin];
+    }
   }
 
   template <class Functor, class Total>
@@ -238,7 +283,8 @@ class Backend {
   static MemoryRequirement requirement(const Executor& executor, std::uint64_t triangle_count,
                                        const BuildOptions& options, bool wide_codes,
                                        std::uint64_t reference_count) {
-    const auto triangles = static_cast<std::uint32_t>(triangle_count);
+    const std::uint32_t triangles =
+        core::most_elements(options, static_cast<std::uint32_t>(triangle_count));
     MemoryRequirement most;
     most.workspace_bytes = wide_codes ? core::bytes_of(core::Workspace<std::uint64_t>{}, triangles)
                                       : core::bytes_of(core::Workspace<std::uint32_t>{}, triangles);
@@ -250,6 +296,12 @@ class Backend {
     if (options.references == References::all)
       most.workspace_bytes += core::bytes_of(core::NotesWorkspace{}, triangles) +
                               core::bytes_of(core::ReferenceWorkspace{}, reference_count);
+    if (core::may_split(options))
+      most.workspace_bytes += core::bytes_of(core::SplitWorkspace{}, triangle_count, triangles);
+    if (options.quality == Quality::balanced)
+      most.workspace_bytes +=
+          core::bytes_of(core::ClusterRecord{}, 1u) +
+          core::bytes_of(core::ClusterWorkspace{}, core::most_clusters(triangles));
     // Of what single verbs take for themselves, a sort by 64 bits takes most.
     const int team = Threads(executor).team(std::max<std::uint64_t>(triangles, reference_count));
     most.workspace_bytes += core::bytes_of(SortScratch{}, team, digits_of(64));

@@ -92,7 +92,9 @@ MemoryRequirement memory_requirement(const cpu::Executor& executor, std::uint64_
   core::check_count(triangle_count);
   return cpu::Backend::requirement(
       executor, triangle_count, options, core::needs_wide_codes(options, triangle_count),
-      options.references == References::once ? triangle_count : reference_count);
+      options.references == References::all
+          ? reference_count
+          : core::most_elements(options, static_cast<std::uint32_t>(triangle_count)));
 }
 
 }  // namespace zkd

@@ -7,7 +7,8 @@
 // host). Every call enqueues on its stream:
 //
 //   for_each(count, f), climb(leaves, arrivals, f)     as the verbs
-//   reduce, select, exclusive_scan, segmented_reduce, radix_sort
+//   histogram(count, f, bins, out)                     likewise, added to what `out` holds
+//   reduce, reduce_and_count, select, exclusive_scan, segmented_reduce, radix_sort
 //       likewise, with two arguments in front: scratch memory and its size. Without memory (null)
 //       nothing is enqueued, and the size becomes what would be needed.
 //   stage(next)                                        for clocks and profilers
@@ -29,9 +30,9 @@
 
 namespace zkd::cuda {
 
-/// What a tree has room for: as many leaves as triangles, and so many references.
+/// What a tree has room for.
 struct Capacity {
-  std::uint64_t triangles = 0;
+  std::uint64_t leaves = 0;
   std::uint64_t references = 0;
 };
 
@@ -76,11 +77,27 @@ class Backend {
         [&](void* scratch, std::size_t& bytes) { device_.reduce(scratch, bytes, count, out, f); });
   }
 
+  template <class T, class Functor>
+  void reduce_and_count(core::Count count, T* out, Functor f, std::uint32_t bins,
+                        std::uint32_t* counts) {
+    for_each(core::Count{nullptr, bins}, core::Fill{counts, 0});
+    enqueue_with_scratch([&](void* scratch, std::size_t& bytes) {
+      device_.reduce_and_count(scratch, bytes, count, out, f, bins, counts);
+    });
+  }
+
   template <class Functor>
   void select(core::Count count, Functor f, std::uint32_t* out, std::uint32_t* total) {
     enqueue_with_scratch([&](void* scratch, std::size_t& bytes) {
       device_.select(scratch, bytes, count, f, out, total);
     });
+  }
+
+  template <class Functor>
+  void histogram(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+    for_each(core::Count{nullptr, bins}, core::Fill{out, 0});
+    if (count.bound == 0) return;
+    enqueue([&] { device_.histogram(count, f, bins, out); });
   }
 
   template <class Functor, class Total>
@@ -125,7 +142,7 @@ class Backend {
     memory_.take(layout, counts...);
   }
 
-  void allocate_tree(core::Count) { memory_.take_for_tree(arrays_, capacity_.triangles); }
+  void allocate_tree(core::Count) { memory_.take_for_tree(arrays_, capacity_.leaves); }
   void allocate_references(core::Count) {
     memory_.take_for_tree(references_, capacity_.references);
   }

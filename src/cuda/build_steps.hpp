@@ -57,8 +57,8 @@ struct TreeAccess {
 };
 
 inline Capacity capacity_for(std::uint64_t triangles, const BuildOptions& options) {
-  return {triangles,
-          options.references == References::all ? options.reference_capacity : triangles};
+  const std::uint64_t leaves = core::most_elements(options, static_cast<std::uint32_t>(triangles));
+  return {leaves, options.references == References::all ? options.reference_capacity : leaves};
 }
 
 /// What the passes left in the tree's block.
@@ -222,7 +222,7 @@ Tree build_with(Device& device, const Executor& executor, const TriangleView& tr
   access.triangles() = on_device;
   access.options() = options;
   access.options().backend = zkd::Backend::cuda;
-  access.triangle_capacity() = capacity.triangles;
+  access.triangle_capacity() = triangles.triangle_count;
   access.workspace_bytes() = plan.workspace_bytes;
   access.own(device, tree_block, triangle_block);
   return tree;
@@ -246,11 +246,11 @@ void rebuild_on(Device& device, const Executor& executor, Tree& tree,
     throw Error(ErrorCode::invalid_view, triangles.triangle_count,
                 "only a tree that was built on the device can be built again");
   const Capacity capacity = capacity_for(access.triangle_capacity(), tree.options());
-  if (triangles.triangle_count > capacity.triangles)
+  if (triangles.triangle_count > access.triangle_capacity())
     throw Error(ErrorCode::invalid_view, triangles.triangle_count,
                 std::to_string(triangles.triangle_count) +
                     " triangles; the tree to be rebuilt has room for " +
-                    std::to_string(capacity.triangles));
+                    std::to_string(access.triangle_capacity()));
   TriangleUpload<Device> upload(device, triangles);
   if (upload.bytes() > tree.triangle_bytes())
     throw Error(ErrorCode::invalid_view, upload.bytes(),

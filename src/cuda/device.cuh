@@ -81,6 +81,61 @@ struct CombinePartial {
   __device__ void operator()(std::uint32_t i, T& value) const { value.combine(partial[i]); }
 };
 
+/// Counts of a block, added to those of all when it ends.
+class BlockCounts {
+ public:
+  __device__ BlockCounts(std::uint32_t* counted, std::uint32_t bins)
+      : counted_(counted), bins_(bins) {
+    for (std::uint32_t bin = threadIdx.x; bin < bins_; bin += block_size) counted_[bin] = 0;
+    __syncthreads();
+  }
+  __device__ void add(std::uint32_t bin) const {
+    if (bin < bins_) atomicAdd(&counted_[bin], 1u);
+  }
+  __device__ void add_to(std::uint32_t* out) const {
+    __syncthreads();
+    for (std::uint32_t bin = threadIdx.x; bin < bins_; bin += block_size)
+      if (counted_[bin] != 0) atomicAdd(&out[bin], counted_[bin]);
+  }
+
+ private:
+  std::uint32_t* counted_;
+  std::uint32_t bins_;
+};
+
+template <class Functor>
+__global__ void __launch_bounds__(block_size)
+    histogram_kernel(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+  __shared__ std::uint32_t counted[core::most_bins];
+  const BlockCounts counts(counted, bins);
+  const std::uint32_t n = actual(count);
+  const std::uint64_t stride = std::uint64_t{gridDim.x} * block_size;
+  Functor g = loaded(f);
+  for (std::uint64_t i = thread_number(); i < n; i += stride)
+    counts.add(g(static_cast<std::uint32_t>(i)));
+  counts.add_to(out);
+}
+
+/// As reduce_kernel, and a histogram of what the functor returns.
+template <class T, class Functor>
+__global__ void __launch_bounds__(block_size)
+    reduce_and_count_kernel(core::Count count, Functor f, T* out, std::uint32_t bins,
+                            std::uint32_t* bin_counts) {
+  using Reduce = cub::BlockReduce<T, block_size>;
+  __shared__ typename Reduce::TempStorage storage;
+  __shared__ std::uint32_t counted[core::most_bins];
+  const BlockCounts counts(counted, bins);
+  const std::uint32_t n = actual(count);
+  const std::uint64_t stride = std::uint64_t{gridDim.x} * block_size;
+  Functor g = loaded(f);
+  T mine{};
+  for (std::uint64_t i = thread_number(); i < n; i += stride)
+    counts.add(g(static_cast<std::uint32_t>(i), mine));
+  counts.add_to(bin_counts);
+  const T all = Reduce(storage).Reduce(mine, Combine{});
+  if (threadIdx.x == 0) out[blockIdx.x] = all;
+}
+
 /// Gives keys behind the actual count the greatest value: the sort leaves them there, since it is
 /// stable.
 template <class Key>
@@ -137,6 +192,12 @@ class Device {
     enqueue(blocks_for(leaves.bound), climb_kernel<Functor>, leaves, arrivals, f);
   }
 
+  template <class Functor>
+  void histogram(core::Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+    enqueue(std::min(most_partials, blocks_for(count.bound)), histogram_kernel<Functor>, count, f,
+            bins, out);
+  }
+
   template <class T, class Functor>
   void reduce(void* scratch, std::size_t& bytes, core::Count count, T* out, Functor f) {
     const unsigned blocks = std::min(most_partials, blocks_for(count.bound));
@@ -146,6 +207,20 @@ class Device {
     }
     T* partial = static_cast<T*>(scratch);
     enqueue(blocks, reduce_kernel<T, Functor>, count, f, partial);
+    enqueue(1, reduce_kernel<T, CombinePartial<T>>, core::Count{nullptr, blocks},
+            CombinePartial<T>{partial}, out);
+  }
+
+  template <class T, class Functor>
+  void reduce_and_count(void* scratch, std::size_t& bytes, core::Count count, T* out, Functor f,
+                        std::uint32_t bins, std::uint32_t* counts) {
+    const unsigned blocks = std::min(most_partials, blocks_for(count.bound));
+    if (scratch == nullptr) {
+      bytes = blocks * sizeof(T);
+      return;
+    }
+    T* partial = static_cast<T*>(scratch);
+    enqueue(blocks, reduce_and_count_kernel<T, Functor>, count, f, partial, bins, counts);
     enqueue(1, reduce_kernel<T, CombinePartial<T>>, core::Count{nullptr, blocks},
             CombinePartial<T>{partial}, out);
   }

@@ -80,6 +80,7 @@ inline core::BuildState state_of(const zkd::Tree& tree) {
   counts.given = static_cast<std::uint32_t>(statistics.triangles);
   counts.listed = state.report.valid;
   counts.left_out = counts.given - counts.listed;
+  counts.splits = tree.options().references == References::budget ? 1 : 0;
   counts.crowded_trunks = static_cast<std::uint32_t>(statistics.crowded_trunks);
   counts.crowded_triangles = static_cast<std::uint32_t>(statistics.crowded_triangles);
   counts.trunks = tree.view().leaf_count();

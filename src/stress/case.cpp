@@ -26,7 +26,10 @@ std::vector<BuildOptions> once_and_all() { return {with(References::once), with(
 std::vector<BuildOptions> many_options() {
   std::vector<BuildOptions> options = {with(References::once),         with(References::all),
                                        with(References::once, 1, 64),  with(References::all, 1, 12),
-                                       with(References::once, 16, 21), with(References::all, 9)};
+                                       with(References::once, 16, 21), with(References::all, 9),
+                                       with(References::budget),       with(References::automatic),
+                                       with(References::once, 2),      with(References::budget, 1)};
+  options[8].quality = options[9].quality = Quality::balanced;
   options[2].axis_order = options[5].axis_order = AxisOrder::cyclic;
   options[3].recode_crowded = options[4].recode_crowded = false;
   return options;

@@ -55,6 +55,7 @@ class Checker {
       : tree_(tree),
         triangles_(triangles),
         strict_(references == References::all),
+        split_(references == References::budget),
         sah_(builder == Builder::sah),
         scale_(static_cast<double>(tree.scale())) {}
 
@@ -70,6 +71,9 @@ class Checker {
     if (strict_) {
       cells();
       if (messages_.empty()) listed_where_it_overlaps();
+    } else if (split_) {
+      listed_in_parts();
+      return std::move(messages_);
     } else {
       listed_once();
     }
@@ -229,6 +233,102 @@ class Checker {
         return;
       }
     }
+  }
+
+  // What must hold where triangles were split: boxes are united on the way up, that of a leaf is no
+  // larger than those of its triangles, and every point of a triangle lies in a leaf that lists it.
+  // Points are tried on a grid over the triangle.
+  void listed_in_parts() {
+    std::vector<ExactBox> leaf_boxes(tree_.leaf_count(), scene_);
+    for (const std::uint32_t index : order_) {
+      const Node& node = tree_.nodes[index];
+      for (int which = 0; which < 2; ++which) {
+        ExactBox box;
+        for (int axis = 0; axis < 3; ++axis) {
+          box.lo[static_cast<std::size_t>(axis)] = static_cast<double>(node.lo(which, axis));
+          box.hi[static_cast<std::size_t>(axis)] = static_cast<double>(node.hi(which, axis));
+        }
+        const Link child = node.child[which];
+        if (child.is_leaf()) {
+          leaf_boxes[child.index()] = box;
+          continue;
+        }
+        const Node& below = tree_.nodes[child.index()];
+        for (int axis = 0; axis < 3; ++axis) {
+          if (std::min(below.lo(0, axis), below.lo(1, axis)) == node.lo(which, axis) &&
+              std::max(below.hi(0, axis), below.hi(1, axis)) == node.hi(which, axis)) {
+            continue;
+          }
+          report(5, "the box of child ", which, " of node ", index,
+                 " is not that of its two children along ", axis_name[axis]);
+          return;
+        }
+      }
+    }
+    std::vector<std::vector<std::uint32_t>> leaves_of(corners_.size());
+    double largest = 0.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      largest = std::max({largest, std::abs(scene_.lo[axis]), std::abs(scene_.hi[axis])});
+    }
+    for (std::uint32_t leaf = 0; leaf < tree_.leaf_count(); ++leaf) {
+      ExactBox whole = empty_box();
+      for (std::uint32_t i = tree_.leaf_offsets[leaf]; i < tree_.leaf_offsets[leaf + 1]; ++i) {
+        const std::uint32_t triangle = tree_.references[i];
+        if (!corners_[triangle]) {
+          report(3, "leaf ", leaf, " lists triangle ", triangle, ", which is not valid");
+          return;
+        }
+        std::vector<std::uint32_t>& leaves = leaves_of[triangle];
+        if (!leaves.empty() && leaves.back() == leaf) {
+          report(4, "triangle ", triangle, " is listed twice in leaf ", leaf);
+          return;
+        }
+        leaves.push_back(leaf);
+        grow(whole, box_of(*corners_[triangle]));
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (leaf_boxes[leaf].lo[axis] >= whole.lo[axis] - slack * largest &&
+            leaf_boxes[leaf].hi[axis] <= whole.hi[axis] + slack * largest) {
+          continue;
+        }
+        report(5, "the box of leaf ", leaf, " is larger than its triangles along ",
+               axis_name[axis]);
+        return;
+      }
+    }
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      if (corners_[i] && !lies_in(*corners_[i], leaves_of[i], leaf_boxes, slack * largest)) {
+        report(3, "triangle ", i, " is listed in ", leaves_of[i].size(),
+               " leaves, whose boxes do not hold it all");
+        return;
+      }
+    }
+  }
+
+  static bool lies_in(const Corners& corners, const std::vector<std::uint32_t>& leaves,
+                      const std::vector<ExactBox>& boxes, double margin) {
+    constexpr int steps = 12;
+    for (int i = 0; i <= steps; ++i) {
+      for (int j = 0; i + j <= steps; ++j) {
+        Point point{};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          point[axis] =
+              (i * corners[0][axis] + j * corners[1][axis] + (steps - i - j) * corners[2][axis]) /
+              steps;
+        }
+        const bool held = std::any_of(leaves.begin(), leaves.end(), [&](std::uint32_t leaf) {
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            if (point[axis] < boxes[leaf].lo[axis] - margin ||
+                point[axis] > boxes[leaf].hi[axis] + margin) {
+              return false;
+            }
+          }
+          return true;
+        });
+        if (!held) return false;
+      }
+    }
+    return true;
   }
 
   // Cells of all leaves, from the scene box down. Every plane lies strictly inside its cell, which
@@ -452,6 +552,7 @@ class Checker {
   const TreeView tree_;
   const TriangleView triangles_;
   const bool strict_;
+  const bool split_;  // several leaves may list a triangle, each for a part of it
   const bool sah_;
   const double scale_;
   std::vector<std::string> messages_;

@@ -91,7 +91,12 @@ inline constexpr std::uint32_t most_rays = 16;
 inline BuildOptions valid_options(Bytes& bytes) {
   constexpr std::array<std::uint32_t, 8> leaf_sizes = {4, 1, 2, 3, 9, 32, 100, 1024};
   BuildOptions options;
-  options.references = bytes.one_in(2) ? References::all : References::once;
+  constexpr std::array<References, 5> policies = {References::once, References::all,
+                                                  References::budget, References::automatic,
+                                                  References::all};
+  options.references = policies[bytes.below(policies.size())];
+  options.budget = 1.0F + 0.25F * static_cast<float>(bytes.below(16));
+  options.quality = bytes.one_in(3) ? Quality::balanced : Quality::fast;
   options.leaf_size = leaf_sizes[bytes.below(leaf_sizes.size())];
   options.code_bits = bytes.below(65);
   options.axis_order = bytes.one_in(2) ? AxisOrder::cyclic : AxisOrder::by_extent;

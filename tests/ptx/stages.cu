@@ -114,7 +114,7 @@ template class MortonPipeline<std::uint64_t, LaunchOnly>;
 template __global__ void for_each_kernel(NumberCrowd);
 template __global__ void for_each_kernel(WriteKey<std::uint32_t>);
 template __global__ void for_each_kernel(WriteKey<std::uint64_t>);
-template __global__ void for_each_kernel(PlaceSplitPlane<CrowdByTrunk>);
+template __global__ void for_each_kernel(PlaceSplitPlane<LatticePlanes, CrowdByTrunk>);
 template __global__ void reduce_kernel(IncludeBox, ValidationReport*);
 
 }  // namespace zkd::core

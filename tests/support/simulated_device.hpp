@@ -158,6 +158,22 @@ class Device {
     });
   }
 
+  template <class T, class Functor>
+  void reduce_and_count(void* scratch, std::size_t& bytes, core::Count count, T* out,
+                        const Functor& f, std::uint32_t bins, std::uint32_t* counts) {
+    if (bins > core::most_bins) throw std::logic_error("a histogram of too many bins");
+    enqueue("reduce_and_count", count, f, scratch, bytes, [=](test::Random& random) {
+      std::vector<T> parts(1 + random.below(20));
+      in_any_order(actual(count), random, [&](std::uint32_t i) {
+        const std::uint32_t bin =
+            loaded(f)(i, parts[random.below(static_cast<std::uint32_t>(parts.size()))]);
+        if (bin < bins) ++counts[bin];
+      });
+      *out = T{};
+      for (const T& part : parts) out->combine(part);
+    });
+  }
+
   template <class Functor>
   void select(void* scratch, std::size_t& bytes, core::Count count, const Functor& f,
               std::uint32_t* out, std::uint32_t* total) {
@@ -172,6 +188,17 @@ class Device {
       for (std::uint32_t i = 0; i < n; ++i)
         if (selected[i] != 0) out[end++] = i;
       *total = end;
+    });
+  }
+
+  template <class Functor>
+  void histogram(core::Count count, const Functor& f, std::uint32_t bins, std::uint32_t* out) {
+    if (bins > core::most_bins) throw std::logic_error("a histogram of too many bins");
+    enqueue("histogram", count, f, [=](test::Random& random) {
+      in_any_order(actual(count), random, [&](std::uint32_t i) {
+        const std::uint32_t bin = loaded(f)(i);
+        if (bin < bins) ++out[bin];
+      });
     });
   }
 

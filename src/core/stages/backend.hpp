@@ -64,6 +64,11 @@ class ExactBackend {
     backend_.select(exact(count), f, out, total);
   }
 
+  template <class Functor>
+  void histogram(Count count, Functor f, std::uint32_t bins, std::uint32_t* out) {
+    backend_.histogram(exact(count), f, bins, out);
+  }
+
   template <class Functor, class Total>
   void exclusive_scan(Count count, Functor f, std::uint32_t* out, Total* total) {
     backend_.exclusive_scan(exact(count), f, out, total);

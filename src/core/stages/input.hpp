@@ -58,6 +58,10 @@ inline void check_references(References references) {
   BuildOptions options;
   options.references = references;
   check_options(options);
+  if (references != References::once && references != References::all)
+    throw Error(ErrorCode::unsupported_option, 0,
+                std::string("a stage by itself lists references once or all, not ") +
+                    to_string(references));
 }
 
 }  // namespace zkd::core

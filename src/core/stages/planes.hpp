@@ -45,14 +45,13 @@ void split_planes(const Executor& executor, std::span<const TrunkKey> trunk_keys
   core::check_each(backend, nodes, "crowd",
                    core::LacksLattice{levels.data(), crowd.data(), lattices.size()});
   const double unscaled = 1.0;
-  backend.for_each(
-      nodes, core::PlaceSplitPlane<core::CrowdByTrunk>{trunk_keys.data(),
-                                                       levels.data(),
-                                                       backend.keep(lattice),
-                                                       backend.keep(core::MortonCoder(lattice)),
-                                                       {crowd.data(), lattices.data()},
-                                                       backend.keep(unscaled),
-                                                       {axes.data(), planes.data(), 1}});
+  backend.for_each(nodes, core::PlaceSplitPlane<core::LatticePlanes, core::CrowdByTrunk>{
+                              trunk_keys.data(),
+                              levels.data(),
+                              {backend.keep(lattice), backend.keep(core::MortonCoder(lattice))},
+                              {crowd.data(), lattices.data()},
+                              backend.keep(unscaled),
+                              {axes.data(), planes.data(), 1}});
   backend.wait();
 }
 

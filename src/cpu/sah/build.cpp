@@ -13,10 +13,10 @@
 #include "core/outcome.hpp"
 #include "core/pipeline.hpp"
 #include "core/quality.hpp"
+#include "core/rounding.hpp"
 #include "cpu/backend.hpp"
 #include "cpu/sah/divide.hpp"
 #include "cpu/sah/front.hpp"
-#include "cpu/sah/rounding.hpp"
 
 namespace zkd::cpu::sah {
 namespace {
@@ -87,8 +87,8 @@ class Build {
     const auto in_tree_space = [scale = input_.state->frame.scale](const Box& box) {
       Box scaled;
       for (int a = 0; a < 3; ++a) {
-        scaled.lo[a] = float_below(static_cast<double>(box.lo[a]) * scale);
-        scaled.hi[a] = float_above(static_cast<double>(box.hi[a]) * scale);
+        scaled.lo[a] = core::float_below(static_cast<double>(box.lo[a]) * scale);
+        scaled.hi[a] = core::float_above(static_cast<double>(box.hi[a]) * scale);
       }
       return scaled;
     };

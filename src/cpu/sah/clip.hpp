@@ -12,7 +12,7 @@
 #include <zkd/traversal/triangle.hpp>
 
 #include "core/frame.hpp"
-#include "cpu/sah/rounding.hpp"
+#include "core/rounding.hpp"
 
 namespace zkd::cpu::sah {
 
@@ -61,8 +61,8 @@ class Clipper {
         lo = core::smaller(lo, corner.is_cut ? corner.p[a] - slack_ : corner.p[a]);
         hi = core::larger(hi, corner.is_cut ? corner.p[a] + slack_ : corner.p[a]);
       }
-      box.lo[a] = core::larger(box.lo[a], float_below(lo));
-      box.hi[a] = core::smaller(box.hi[a], float_above(hi));
+      box.lo[a] = core::larger(box.lo[a], core::float_below(lo));
+      box.hi[a] = core::smaller(box.hi[a], core::float_above(hi));
     }
     return !box.empty();
   }

@@ -7,17 +7,17 @@
 
 #include <zkd/traversal/arithmetic.hpp>
 
-namespace zkd::cpu::sah {
+namespace zkd::core {
 
 /// The smallest float that is not below x. Never -0; |x| must be that of a float.
-inline float float_above(double x) {
+ZKD_HOST_DEVICE inline float float_above(double x) {
   const float nearest = static_cast<float>(x) + 0.0F;
   if (static_cast<double>(nearest) >= x) return nearest;
-  const std::uint32_t bits = core::bits_of(nearest);
-  return core::float_of(nearest >= 0.0F ? bits + 1 : bits - 1) + 0.0F;
+  const std::uint32_t bits = bits_of(nearest);
+  return float_of(nearest >= 0.0F ? bits + 1 : bits - 1) + 0.0F;
 }
 
 /// The largest float that is not above x; likewise.
-inline float float_below(double x) { return -float_above(-x) + 0.0F; }
+ZKD_HOST_DEVICE inline float float_below(double x) { return -float_above(-x) + 0.0F; }
 
-}  // namespace zkd::cpu::sah
+}  // namespace zkd::core
