@@ -85,7 +85,11 @@ BuildOptions options_of(std::uint64_t number, scene::Random& random) {
   constexpr std::uint32_t widths[] = {0, 15, 32, 48, 64};
   BuildOptions options;
   options.invalid_triangles = InvalidTriangles::skip;
-  options.references = number % 2 == 0 ? References::once : References::all;
+  constexpr References others[] = {References::once, References::budget, References::once,
+                                   References::automatic};
+  options.references = number % 2 == 0 ? others[random.below(4)] : References::all;
+  options.budget = 1.0F + 0.5F * static_cast<float>(random.below(5));
+  options.quality = random.below(3) == 0 ? Quality::balanced : Quality::fast;
   options.leaf_size = leaf_sizes[random.below(5)];
   options.code_bits = widths[random.below(5)];
   options.axis_order = random.below(4) == 0 ? AxisOrder::cyclic : AxisOrder::by_extent;
@@ -96,7 +100,8 @@ BuildOptions options_of(std::uint64_t number, scene::Random& random) {
 std::string describe(const std::string& mesh, std::uint64_t case_number,
                      const BuildOptions& options) {
   return mesh + ", case " + std::to_string(case_number) + ", references " +
-         zkd::to_string(options.references) + ", leaf size " + std::to_string(options.leaf_size) +
+         zkd::to_string(options.references) + " " + zkd::to_string(options.quality) + ", budget " +
+         std::to_string(options.budget) + ", leaf size " + std::to_string(options.leaf_size) +
          ", code bits " + std::to_string(options.code_bits);
 }
 

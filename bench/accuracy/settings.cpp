@@ -38,10 +38,17 @@ std::vector<Setting> all_settings(bool cuda) {
   for (const Intersector intersector : all_intersectors) {
     add("intersector", zkd::to_string(intersector), base, Walk::library, intersector);
   }
-  for (const References references : {References::once, References::all}) {
+  for (const References references :
+       {References::once, References::budget, References::automatic, References::all}) {
     BuildOptions build = base;
     build.references = references;
     add("references", zkd::to_string(references), build);
+  }
+  {
+    BuildOptions build = base;
+    build.quality = Quality::balanced;
+    build.references = References::automatic;
+    add("references", "balanced", build);
   }
   for (const std::uint32_t bits : {32u, 64u}) {
     BuildOptions build = base;

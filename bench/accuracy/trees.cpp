@@ -12,6 +12,7 @@
 #include "scene/generate.hpp"
 #include "scene/progress.hpp"
 #include "support/meshes.hpp"
+#include "support/tree_kinds.hpp"
 #include "verify/tree_hash.hpp"
 #include "walks.hpp"
 
@@ -34,8 +35,7 @@ class HashComparison {
     if (cuda) result_.backends.push_back("cuda");
   }
 
-  void compare(const std::string& name, const scene::Mesh& mesh, References references) {
-    const BuildOptions options = options_with(references);
+  void compare(const std::string& name, const scene::Mesh& mesh, const BuildOptions& options) {
     std::set<std::string> hashes;
     std::set<std::string> mapped;
     for (const int threads : {1, 2, 3, 8}) {
@@ -62,7 +62,7 @@ class HashComparison {
     ++result_.cases;
     const std::uint64_t too_many = hashes.size() - 1 + mapped.size() - 1;
     if (too_many > 0 && result_.first_offender.empty()) {
-      result_.first_offender = name + ", references " + zkd::to_string(references);
+      result_.first_offender = name + ", references " + test::name_of(options);
     }
     result_.hashes_too_many += too_many;
   }
@@ -129,10 +129,14 @@ std::vector<TreeQuality> measure_quality(const TestScene& scene, const std::vect
   sah.builder = Builder::sah;
   std::vector<TreeQuality> qualities;
   qualities.push_back(quality_of("exact SAH", sah, scene, sets, executor));
-  for (const References references : {References::once, References::all}) {
+  for (const References references :
+       {References::once, References::budget, References::automatic, References::all}) {
     qualities.push_back(
         quality_of(zkd::to_string(references), options_with(references), scene, sets, executor));
   }
+  BuildOptions balanced = options_with(References::automatic);
+  balanced.quality = Quality::balanced;
+  qualities.push_back(quality_of("balanced", balanced, scene, sets, executor));
   const double exact = qualities.front().sah_cost;
   for (TreeQuality& quality : qualities) {
     quality.sah_over_exact = exact > 0.0 ? quality.sah_cost / exact : 0.0;
@@ -145,9 +149,7 @@ Determinism compare_hashes(const std::vector<TestScene>& scenes, std::uint64_t s
   HashComparison comparison(seed, cuda);
   scene::Progress progress("hashes", small_meshes + scenes.size());
   const auto compare = [&](const std::string& name, const scene::Mesh& mesh) {
-    for (const References references : {References::once, References::all}) {
-      comparison.compare(name, mesh, references);
-    }
+    for (const BuildOptions& options : test::tree_kinds()) comparison.compare(name, mesh, options);
     progress.advance(1);
   };
   for (const TestScene& scene : scenes) compare(scene.name, scene.mesh);
