@@ -38,6 +38,14 @@ __global__ void reduce_kernel(Functor f, T* out) {
 }
 
 template <class Functor, class T>
+__global__ void reduce_and_count_kernel(Functor f, T* out, std::uint32_t* counts) {
+  Functor g = loaded(f);
+  T value{};
+  atomicAdd(counts + g(thread_number(), value), 1u);
+  out[thread_number()].combine(value);
+}
+
+template <class Functor, class T>
 __global__ void segmented_reduce_kernel(Functor f, const std::uint32_t* offsets, T* out) {
   Functor g = loaded(f);
   const std::uint32_t segment = blockIdx.x;
@@ -66,6 +74,14 @@ class LaunchOnly {
   template <class T, class Functor>
   void reduce(Count count, T* out, Functor f) {
     reduce_kernel<<<count.bound, 1>>>(f, out);
+  }
+  template <class T, class Functor>
+  void reduce_and_count(Count count, T* out, Functor f, std::uint32_t, std::uint32_t* counts) {
+    reduce_and_count_kernel<<<count.bound, 1>>>(f, out, counts);
+  }
+  template <class Functor>
+  void histogram(Count count, Functor f, std::uint32_t, std::uint32_t* out) {
+    value_kernel<<<count.bound, 1>>>(f, out);
   }
   template <class Functor>
   void select(Count count, Functor f, std::uint32_t* out, std::uint32_t*) {
