@@ -236,8 +236,10 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   for (const Builder one_builder : builders) {
     for (const Quality one_quality : qualities) {
       for (const References one_policy : policies) {
-        // sah knows one policy only.
-        if (one_builder == Builder::sah && one_policy != policies.front()) continue;
+        // The others know one policy and one quality only.
+        if (one_builder != Builder::morton &&
+            (one_policy != policies.front() || one_quality != qualities.front()))
+          continue;
         for (const Layout one_layout : layouts) {
           BuildOptions setting = base;
           setting.builder = one_builder;
