@@ -13,18 +13,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::Bytes bytes(data, size);
   const BuildOptions options = fuzz::valid_options(bytes);
   const bool on_lattice = bytes.one_in(2);
-  // Rays come first, so that the triangles are what is read last: they aim at corners made of the
-  // same bytes.
+  // Rays are read first, so that the triangles are what is read last; those that aim at corners are
+  // made of the same bytes.
   const fuzz::Bytes from_here = bytes;
-  std::vector<Ray> rays = fuzz::any_rays(bytes, {});
+  const std::vector<Ray> unaimed = fuzz::any_rays(bytes, {});
   fuzz::Bytes again = from_here;
   scene::Mesh mesh = on_lattice ? fuzz::lattice_input(bytes, false).mesh : fuzz::any_mesh(bytes);
   std::erase_if(mesh.faces, [&](const glm::uvec3& face) {
     return face.x >= mesh.positions.size() || face.y >= mesh.positions.size() ||
            face.z >= mesh.positions.size();
   });
-  const std::vector<Ray> aimed = fuzz::any_rays(again, mesh.positions);
-  rays.insert(rays.end(), aimed.begin(), aimed.end());
+  std::vector<Ray> rays = fuzz::any_rays(again, mesh.positions);
+  rays.insert(rays.end(), unaimed.begin(), unaimed.end());
   fuzz::check_queries(mesh, options, rays);
   return 0;
 }
