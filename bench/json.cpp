@@ -136,6 +136,7 @@ Json json_of(const Result& result) {
   const Statistics& statistics = result.statistics;
   Json json = {{"scene", result.scene},
                {"triangles", result.triangles},
+               {"label", result.setting},
                {"stand_in", result.stand_in},
                {"note", unless_empty(result.note)},
                {"paper",

@@ -90,6 +90,18 @@ TEST(TreeStages, GiveTheBytesOfABuild) {
   }
 }
 
+// Crowds of some ten to 20,000 triangles each: the CPU takes them trunk by trunk in a build, and
+// sorts few, some and many in different ways.
+TEST(TreeStages, GiveTheBytesOfABuildOfCrowdedScenes) {
+  for (const std::uint32_t code_bits : {1u, 3u, 6u, 8u, 10u, 12u}) {
+    SCOPED_TRACE(std::to_string(code_bits) + " bits");
+    expect_equals_composition(scene::soup(40000, 3).view(), {.code_bits = code_bits});
+    expect_equals_composition(scene::flat(3000, 1, 3).view(), {.code_bits = code_bits});
+    expect_equals_composition(scene::sphere(4).view(), {.leaf_size = 1, .code_bits = code_bits});
+  }
+  expect_equals_composition(scene::joined(scene::identical(500), scene::identical(40)).view(), {});
+}
+
 TEST(TreeStages, GiveTheBytesOfABuildOfLargerScenes) {
   expect_equals_composition(scene::soup(50000, 2).view(), {});
   expect_equals_composition(scene::soup(50000, 2).view(), {.references = References::all});

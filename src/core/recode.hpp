@@ -188,6 +188,21 @@ struct RecodeWorkspace {
   }
 };
 
+/// The crowded trunks, found and counted, and where the second round has its results.
+struct CrowdedTrunks {
+  const Box* boxes;
+  std::uint32_t* ids;
+  AxisOrder order;
+  const SceneFrame* frame;
+  RecodeWorkspace work;
+};
+
+/// A backend that goes through them trunk by trunk, to the same bytes.
+template <class Backend>
+concept RecodesByTrunk = requires(Backend& backend, const CrowdedTrunks& trunks, Count count) {
+  backend.recode(trunks, count, count);
+};
+
 /// The most crowded trunks that `triangles` can make.
 inline std::uint32_t most_crowded_trunks(std::uint32_t triangles, std::uint32_t leaf_size) {
   return triangles / (leaf_size + 1);
@@ -229,6 +244,15 @@ class SecondRound {
     backend.for_each(trunks, CopyTo<std::uint32_t>{first_scratch, work.first});
     backend.for_each(trunks, CopyTo<std::uint32_t>{offsets_scratch, work.offsets});
 
+    backend.for_each(triangles, Fill{work.fine, 0});
+    if constexpr (RecodesByTrunk<Backend>)
+      backend.recode(CrowdedTrunks{boxes, ids, order, frame, work}, trunks, crowded);
+    else
+      run_in_passes(backend, trunks, crowded);
+  }
+
+ private:
+  void run_in_passes(Backend& backend, Count trunks, Count crowded) {
     backend.segmented_reduce(trunks, work.offsets, crowded, work.centres,
                              IncludeCentre{boxes, ids, work.first, work.offsets});
     backend.for_each(trunks,
@@ -237,7 +261,6 @@ class SecondRound {
                                              work.sort.keys, work.sort.values});
     work.sort =
         backend.radix_sort(work.sort, crowded, fine_bits + bits_to_count(backend.size(trunks)));
-    backend.for_each(triangles, Fill{work.fine, 0});
     backend.for_each(crowded,
                      PlaceRecoded{members(), work.sort.keys, work.sort.values, ids, work.fine});
   }

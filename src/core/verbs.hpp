@@ -20,6 +20,7 @@
 //   then f.rise(node) for each node whose second
 //                                      child has arrived (counted in `arrivals`, zero before); both
 //                                      return the way up. f.prefetch(leaf) may be called before
+//   recode(trunks, count, elements)    optional: the second round in one (core/recode.hpp)
 //   may_exist(count), size(count)      what the host knows; where only the device does: true, bound
 //   raise(status, triangles)           throws what the status says, if the host can look now
 //   reference_capacity()               how many references a tree may have

@@ -27,6 +27,7 @@
 #include "core/pipeline.hpp"
 #include "cpu/float_environment.hpp"
 #include "cpu/radix_sort.hpp"
+#include "cpu/second_round.hpp"
 #include "cpu/threads.hpp"
 
 namespace zkd::cpu {
@@ -211,11 +212,29 @@ class Backend {
   template <class Key>
   core::SortBuffers<Key> radix_sort(core::SortBuffers<Key> buffers, core::Count count,
                                     std::uint32_t bits) {
+    return sort(buffers, size(count), bits, passes_left_out_);
+  }
+
+  /// Each thread takes whole trunks. One that is so large that others would wait for it is done by
+  /// all threads, in passes.
+  void recode(const core::CrowdedTrunks& trunks, core::Count count, core::Count triangles) {
     const std::uint32_t n = size(count);
-    SortScratch scratch{};
-    const int team = threads_.team(n);
-    const core::HostBlock block = lay_out(scratch, team, digits_of(bits));
-    return RadixSort<Key>(threads_, scratch, buffers, n, bits).run(passes_left_out_);
+    const std::uint32_t all = size(triangles);
+    const std::uint32_t* const offsets = trunks.work.offsets;
+    const auto length = [=](std::uint32_t c) {
+      return (c + 1 < n ? offsets[c + 1] : all) - offsets[c];
+    };
+    constexpr std::uint32_t large = 8 * grain;
+    const std::uint32_t most = threads_.available() > 1 ? large : all;
+    const core::CrowdedTriangles members{trunks.work.first, offsets, &n};
+    for (std::uint32_t c = 0; c < n; ++c)
+      if (length(c) > most) recode_large(trunks, members, c, length(c));
+    const auto trunks_a_grain = static_cast<std::uint32_t>(grain * n / all + 1);
+    threads_.share(n, trunks_a_grain, [=](Range range) {
+      const RecodeTrunk recode{trunks};
+      for (std::uint32_t c = range.begin; c < range.end; ++c)
+        if (length(c) <= most) recode(c, length(c));
+    });
   }
 
   template <class Functor>
@@ -374,6 +393,42 @@ class Backend {
       data = layout.array;
     }
   };
+
+  template <class Key>
+  core::SortBuffers<Key> sort(core::SortBuffers<Key> buffers, std::uint32_t n, std::uint32_t bits,
+                              PassesLeftOut& left_out) {
+    SortScratch scratch{};
+    const int team = threads_.team(n);
+    const core::HostBlock block = lay_out(scratch, team, digits_of(bits));
+    return RadixSort<Key>(threads_, scratch, buffers, n, bits).run(left_out);
+  }
+
+  /// The passes of core::SecondRound over one trunk.
+  void recode_large(const core::CrowdedTrunks& trunks, const core::CrowdedTriangles& members,
+                    std::uint32_t c, std::uint32_t n) {
+    const core::RecodeWorkspace& work = trunks.work;
+    const std::uint32_t offset = work.offsets[c];
+    const core::Count count{nullptr, n};
+    reduce(count, &work.centres[c],
+           [c, offset,
+            include = core::IncludeCentre{trunks.boxes, trunks.ids, work.first, work.offsets}](
+               std::uint32_t i, core::WideBox& box) { include(c, offset + i, box); });
+    core::CrowdedLattice{work.centres, trunks.order, trunks.frame, work.lattices, work.coders}(c);
+    for_each(count, [offset, recode = core::RecodeTriangle{
+                                 trunks.boxes, trunks.ids, members, work.lattices, work.coders,
+                                 work.sort.keys, work.sort.values, c}](std::uint32_t i) mutable {
+      recode(offset + i);
+    });
+    const core::SortBuffers<std::uint64_t> all = work.sort;
+    PassesLeftOut not_counted;
+    const core::SortBuffers<std::uint64_t> sorted =
+        sort<std::uint64_t>({all.keys + offset, all.values + offset, all.other_keys + offset,
+                             all.other_values + offset},
+                            n, core::fine_bits, not_counted);
+    for_each(count, [offset, place = core::PlaceRecoded{
+                                 members, sorted.keys - offset, sorted.values - offset, trunks.ids,
+                                 work.fine}](std::uint32_t i) { place(offset + i); });
+  }
 
   template <class Layout, class... Counts>
   core::HostBlock lay_out(Layout& layout, Counts... counts) {

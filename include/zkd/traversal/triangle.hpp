@@ -82,15 +82,19 @@ ZKD_HOST_DEVICE inline Wide normal(const Corners& c, int axis) {
                         static_cast<double>(c.p[2][i]), static_cast<double>(c.p[2][j]));
 }
 
-/// Is the area of the triangle's projection exactly zero?
-ZKD_HOST_DEVICE inline bool projection_has_zero_area(Wide ax, Wide ay, Wide bx, Wide by, Wide cx,
-                                                     Wide cy) {
+/// Whether the area of the triangle's projection differs from zero for certain.
+ZKD_HOST_DEVICE inline bool projection_surely_has_area(Wide ax, Wide ay, Wide bx, Wide by, Wide cx,
+                                                       Wide cy) {
   const Wide left = (bx - ax) * (cy - ay);
   const Wide right = (by - ay) * (cx - ax);
   // Shewchuk's bound for the sign of the difference, (3 + 16 u) u with u = 2^-53.
   const Wide bound = Wide(3.3306690738754716e-16) * (magnitude(left) + magnitude(right));
-  if (magnitude(left - right) > bound) return false;
-  return projected_area(ax, ay, bx, by, cx, cy) == Wide(0.0);
+  return magnitude(left - right) > bound;
+}
+
+/// Whether two points are the same.
+ZKD_HOST_DEVICE inline bool coincide(const float* a, const float* b) {
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
 /// Exactly: corners that coincide or lie on one line. A float cross product of zero would also
@@ -99,9 +103,14 @@ ZKD_HOST_DEVICE inline bool has_zero_area(const Corners& c) {
   const float* a = c.p[0];
   const float* b = c.p[1];
   const float* d = c.p[2];
-  return projection_has_zero_area(a[0], a[1], b[0], b[1], d[0], d[1]) &&
-         projection_has_zero_area(a[1], a[2], b[1], b[2], d[1], d[2]) &&
-         projection_has_zero_area(a[2], a[0], b[2], b[0], d[2], d[0]);
+  // One projection with an area is enough, and that of a wall need not be the first. Exact sums,
+  // which take long, are left for what neither has an area for certain nor corners that coincide.
+  if (projection_surely_has_area(a[0], a[1], b[0], b[1], d[0], d[1]) ||
+      projection_surely_has_area(a[1], a[2], b[1], b[2], d[1], d[2]) ||
+      projection_surely_has_area(a[2], a[0], b[2], b[0], d[2], d[0]))
+    return false;
+  if (coincide(a, b) || coincide(b, d) || coincide(d, a)) return true;
+  return normal(c, 0) == Wide(0.0) && normal(c, 1) == Wide(0.0) && normal(c, 2) == Wide(0.0);
 }
 
 /// Whether a build takes the triangle. Its indices must be in range.
