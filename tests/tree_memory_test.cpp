@@ -49,8 +49,9 @@ BuildOptions options_for(References references, std::uint32_t code_bits = 0) {
 // Each way to build that takes its memory in another way.
 std::vector<BuildOptions> ways() {
   std::vector<BuildOptions> all = {options_for(References::once), options_for(References::all),
-                                   options_for(References::all)};
-  all.back().builder = Builder::sah;
+                                   options_for(References::all), options_for(References::all)};
+  all[2].builder = Builder::sah;
+  all[3].builder = Builder::wu2011;
   return all;
 }
 
