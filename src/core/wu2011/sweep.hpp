@@ -20,9 +20,12 @@
 
 namespace zkd::core::wu2011 {
 
+/// What a plane costs that may not divide its node.
+inline constexpr double impossible = std::numeric_limits<double>::infinity();
+
 /// Best of some planes: the cheapest, of equally cheap ones the lowest, and flat references below.
 struct Candidate {
-  double cost = std::numeric_limits<double>::infinity();
+  double cost = impossible;
   float plane = 0.0F;
   std::uint32_t flat_below = 0;
 
@@ -180,7 +183,7 @@ struct SumBelow : private Sweep {
  private:
   ZKD_HOST_DEVICE void weigh(bool is_candidate, std::uint32_t event, const Swept& sum,
                              double& cost) const {
-    double whole = std::numeric_limits<double>::infinity();
+    double whole = impossible;
     if (is_candidate) {
       const float plane = position_of(level_.events[event]);
       if (options_.areas == SahAreas::cells) {
