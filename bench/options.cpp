@@ -167,8 +167,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   number(build, "--reference-capacity", reference_capacity,
          "On CUDA, references that `all` has room for; 0: as many as it needs", 0,
          std::int64_t{max_count});
-  text(build, "--sah-areas", sah_areas, "For sah and wu2011, areas of: " + names_of(all_sah_areas, ", "),
-       "WHAT");
+  text(build, "--sah-areas", sah_areas,
+       "For sah and wu2011, areas of: " + names_of(all_sah_areas, ", "), "WHAT");
   fraction("--sah-visit-cost", visit_cost, "For sah and wu2011, the cost of a node visit");
   fraction("--sah-test-cost", test_cost, "For sah and wu2011, the cost of a triangle test");
   fraction("--sah-empty-bonus", empty_bonus, "For both over cells, what cutting off space saves");
