@@ -184,22 +184,6 @@ TEST(ApiError, EnumeratorsThatDoNotExist) {
   EXPECT_ERROR(build_error(strip.view(), options), ErrorCode::invalid_option, 99);
 }
 
-TEST(ApiError, OptionsOfLaterVersions) {
-  const Strip strip(10);
-  std::vector<BuildOptions> later(1);
-  later[0].builder = Builder::wu2011;
-  const char* words[] = {"wu2011"};
-  for (std::size_t i = 0; i < later.size(); ++i) {
-    const Caught error = build_error(strip.view(), later[i]);
-    ASSERT_TRUE(error.thrown) << words[i];
-    EXPECT_EQ(error.code, ErrorCode::unsupported_option) << error.message;
-    EXPECT_TRUE(names(error, words[i])) << error.message;
-    EXPECT_EQ(caught([&] { (void)memory_requirement(cpu::Executor{}, 10, later[i]); }).code,
-              ErrorCode::unsupported_option);
-  }
-}
-
-// Builder::sah is the CPU's.
 TEST(ApiError, TheSahBuilderOnADevice) {
   if (test::backend() == Backend::cpu) GTEST_SKIP() << "not a device: see sah_build_test.cpp";
   const Strip strip(10);

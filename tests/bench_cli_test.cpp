@@ -108,16 +108,21 @@ TEST_F(BenchCli, BadInputIsOneLineThatNamesTheFile) {
   expect_error("tetra.obj --images tetra.obj/images", 2, "--images");
 }
 
-TEST_F(BenchCli, WhatThisVersionDoesNotBuildIsUsage) {
-  expect_error("tetra.obj --builder wu2011", 2, "wu2011");
-}
-
 TEST_F(BenchCli, QualityHighIsTheSahBuilder) {
   const Json high = run_json("tetra.obj --quality high" + std::string(quick))["results"][0];
   const Json sah = run_json("tetra.obj --builder sah" + std::string(quick))["results"][0];
   EXPECT_EQ(high["options"]["builder"], "sah");
   EXPECT_EQ(high["options"]["quality"], "high");
   EXPECT_EQ(high["tree"]["hash"], sah["tree"]["hash"]);
+}
+
+TEST_F(BenchCli, Wu2011MakesTheTreeOfSah) {
+  const Json results = run_json("tetra.obj --builder sah,wu2011" + std::string(quick))["results"];
+  ASSERT_EQ(results.size(), 2u);
+  EXPECT_EQ(results[1]["options"]["builder"], "wu2011");
+  EXPECT_EQ(results[1]["options"]["references"], "all");
+  EXPECT_EQ(results[1]["tree"]["hash"], results[0]["tree"]["hash"]);
+  EXPECT_EQ(results[1]["tree"]["sah"], results[0]["tree"]["sah"]);
 }
 
 // What --backend cuda says here, if no CUDA device answers.

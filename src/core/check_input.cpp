@@ -13,11 +13,6 @@ namespace {
   throw Error(code, offender, message);
 }
 
-[[noreturn]] void unsupported(const char* option, const char* value) {
-  fail(ErrorCode::unsupported_option, 0,
-       std::string(option) + " " + value + " is not in this version of zkd (" ZKD_VERSION ")");
-}
-
 template <class Enum>
 void check(Enum value, Enum last, const char* option) {
   check_enumerator(static_cast<std::int64_t>(value), static_cast<std::int64_t>(last), option);
@@ -61,11 +56,6 @@ void check_ranges(const BuildOptions& options) {
          "reference_capacity is " + std::to_string(options.reference_capacity) +
              "; a tree holds at most " + std::to_string(max_count));
   check_ranges(options.sah);
-}
-
-/// What this version does not have.
-void check_supported(const BuildOptions& options) {
-  if (options.builder == Builder::wu2011) unsupported("builder", to_string(options.builder));
 }
 
 }  // namespace
@@ -114,12 +104,18 @@ void check_options(const BuildOptions& options) {
   if (builder_for(options) == Builder::sah)
     fail(ErrorCode::unsupported_option, 0,
          "builder sah (and quality high) is only there for builds on the CPU");
-  check_supported(options);
+}
+
+void check_predictable(const BuildOptions& options) {
+  const Builder builder = builder_for(options);
+  if (builder != Builder::morton)
+    fail(ErrorCode::unsupported_option, 0,
+         std::string("what builder ") + to_string(builder) +
+             " takes is not known beforehand: memory_requirement is for others");
 }
 
 void check_cpu_options(const BuildOptions& options) {
   check_ranges(options);
-  check_supported(options);
 }
 
 }  // namespace zkd::core

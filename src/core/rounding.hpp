@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include <zkd/geometry.hpp>
 #include <zkd/traversal/arithmetic.hpp>
 
 namespace zkd::core {
@@ -19,5 +20,15 @@ ZKD_HOST_DEVICE inline float float_above(double x) {
 
 /// The largest float that is not above x; likewise.
 ZKD_HOST_DEVICE inline float float_below(double x) { return -float_above(-x) + 0.0F; }
+
+/// A box of the caller's units in tree space, where scaling may underflow.
+ZKD_HOST_DEVICE inline Box in_tree_space(const Box& box, double scale) {
+  Box scaled;
+  for (int a = 0; a < 3; ++a) {
+    scaled.lo[a] = float_below(static_cast<double>(box.lo[a]) * scale);
+    scaled.hi[a] = float_above(static_cast<double>(box.hi[a]) * scale);
+  }
+  return scaled;
+}
 
 }  // namespace zkd::core

@@ -11,13 +11,20 @@
 //   stage(Stage)                       names the work that follows, for clocks and profilers
 //   for_each(count, f)                 f(i)
 //   reduce(count, &out, f)             out = T{}; f(i, out) for all i, in any grouping (T::combine)
-//   reduce_and_count(count, &out, f, bins, counts)      both of these at once: f(i, out) names the
-//   bin select(count, f, out, &total)      the i for which f(i), in order histogram(count, f, bins,
-//   out)     out[b] = how many i have f(i) = b, below bins (most_bins at most)
-//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1) segmented_reduce(segments,
-//   offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s]) radix_sort(buffers, count, bits)
-//   stable; says in which of the buffers the result is climb(leaves, arrivals, f) f.begin(leaf),
-//   then f.rise(node) for each node whose second
+//   histogram(count, f, bins, out)     out[b] = how many i have f(i) = b, below `bins` (at most
+//                                      most_bins)
+//   reduce_and_count(count, &out, f, bins, counts)     both at once: f(i, out) names the bin
+//   select(count, f, out, &total)      the i for which f(i), in order
+//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
+//   scan<T>(count, f)                  sum = T{}; for each i in order: f(i, sum), then f.take(i,
+//   sum),
+//                                      in any grouping (T::combine, of what follows). f.take(i) may
+//                                      write to what f(i) reads and no other f(k) does. Segments
+//                                      are in T, which a first element empties; f.segment_begin(i):
+//                                      the first element that the sum at i depends on
+//   segmented_reduce(segments, offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s])
+//   radix_sort(buffers, count, bits)   stable; says in which of the buffers the result is
+//   climb(leaves, arrivals, f)         f.begin(leaf), then f.rise(node) for each node whose second
 //                                      child has arrived (counted in `arrivals`, zero before); both
 //                                      return the way up. f.prefetch(leaf) may be called before
 //   recode(trunks, count, elements)    optional: the second round in one (core/recode.hpp)
@@ -25,6 +32,8 @@
 //   raise(status, triangles)           throws what the status says, if the host can look now
 //   reference_capacity()               how many references a tree may have
 //   take(layout, counts...)            arrays until the build ends
+//   hold(bytes)                        a block of its own (Held: data(), bytes()), until its owner
+//                                      dies. Only where builds wait
 //   keep(value)                        a copy in the backend's memory until the build ends, for
 //                                      functors to point to
 //   read(pointer)                      what it points to, when all that was enqueued is done:
@@ -32,6 +41,7 @@
 //                                      Builds do not, single stages do (core/stages)
 //   allocate_tree, allocate_references the arrays of the tree, from then on at header(), nodes(),
 //                                      leaf_offsets(), references()
+//   allocate_tree_exactly(leaves, references)     both, where the host knows
 //
 // A functor is copied for every range of elements that one thread works on. If it has a member
 // load(), that is called first: there the copy reads numbers that earlier stages left in the

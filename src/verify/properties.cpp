@@ -56,7 +56,7 @@ class Checker {
         triangles_(triangles),
         strict_(references == References::all),
         split_(references == References::budget),
-        sah_(builder == Builder::sah),
+        sah_(builder != Builder::morton),
         scale_(static_cast<double>(tree.scale())) {}
 
   std::vector<std::string> run() {
