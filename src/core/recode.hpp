@@ -97,15 +97,20 @@ struct IncludeCentre {
 };
 
 /// The c-th crowded trunk: a lattice over its centres.
+template <class Code>
 struct CrowdedLattice {
   const WideBox* centres;
+  const Code* codes;
+  const std::uint32_t* first;
+  const std::uint8_t* most_bits;  ///< by code; null: fine_bits
   AxisOrder order;
   const SceneFrame* frame;
   Lattice* lattices;
   MortonCoder* coders;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t c) const {
-    lattices[c] = make_lattice(centres[c], fine_bits, order, frame->finest);
+    const std::uint32_t bits = most_bits != nullptr ? most_bits[codes[first[c]]] : fine_bits;
+    lattices[c] = make_lattice(centres[c], bits, order, frame->finest);
     coders[c] = MortonCoder(lattices[c]);
   }
 };
@@ -204,10 +209,11 @@ class SecondRound {
   std::uint32_t leaf_size;
   AxisOrder order;
   const SceneFrame* frame;
-  std::uint32_t* trunk_count;      ///< out: crowded trunks
-  std::uint32_t* triangle_count;   ///< out: triangles in them
-  std::uint32_t* first_scratch;    ///< room for one number per triangle
-  std::uint32_t* offsets_scratch;  ///< likewise
+  std::uint32_t* trunk_count;               ///< out: crowded trunks
+  std::uint32_t* triangle_count;            ///< out: triangles in them
+  std::uint32_t* first_scratch;             ///< room for one number per triangle
+  std::uint32_t* offsets_scratch;           ///< likewise
+  const std::uint8_t* most_bits = nullptr;  ///< of codes again, by code; null: fine_bits
 
   RecodeWorkspace work{};
 
@@ -231,8 +237,8 @@ class SecondRound {
 
     backend.segmented_reduce(trunks, work.offsets, crowded, work.centres,
                              IncludeCentre{boxes, ids, work.first, work.offsets});
-    backend.for_each(trunks,
-                     CrowdedLattice{work.centres, order, frame, work.lattices, work.coders});
+    backend.for_each(trunks, CrowdedLattice<Code>{work.centres, codes, work.first, most_bits, order,
+                                                  frame, work.lattices, work.coders});
     backend.for_each(crowded, RecodeTriangle{boxes, ids, members(), work.lattices, work.coders,
                                              work.sort.keys, work.sort.values});
     work.sort =

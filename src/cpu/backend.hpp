@@ -246,14 +246,29 @@ class Backend {
       most.workspace_bytes +=
           core::bytes_of(core::RecodeWorkspace{}, triangles, crowded, crowded > 0 ? triangles : 0);
     }
-    if (options.references == References::all)
-      most.workspace_bytes += core::bytes_of(core::NotesWorkspace{}, triangles) +
-                              core::bytes_of(core::ReferenceWorkspace{}, reference_count);
+    const std::uint64_t leaves = options.references == References::all
+                                     ? core::most_reference_trunks(reference_count, triangles)
+                                     : triangles;
+    if (options.references == References::all) {
+      const auto references = static_cast<std::uint32_t>(reference_count);
+      const std::uint32_t crowded =
+          core::most_crowded_trunks(references, core::crowded_factor * options.leaf_size);
+      most.workspace_bytes +=
+          core::bytes_of(core::SkeletonWorkspace{}, triangles) +
+          core::bytes_of(core::NotesWorkspace{}, triangles, core::remembered_of_triangle) +
+          core::bytes_of(core::ReferenceWorkspace{}, references, triangles) +
+          core::bytes_of(core::CrowdedLeavesWorkspace{}, references, triangles) +
+          core::bytes_of(core::RecodeWorkspace{}, references, crowded, references) +
+          core::bytes_of(core::ReferenceTrunkWorkspace{}, references, triangles) +
+          core::bytes_of(core::SubtreeWorkspace{}, leaves) +
+          core::bytes_of(core::NotesWorkspace{}, references, core::remembered_of_reference) +
+          core::bytes_of(core::SplitReferenceWorkspace{}, references, leaves);
+    }
     // Of what single verbs take for themselves, a sort by 64 bits takes most.
     const int team = Threads(executor).team(std::max<std::uint64_t>(triangles, reference_count));
     most.workspace_bytes += core::bytes_of(SortScratch{}, team, digits_of(64));
     most.tree_bytes =
-        core::bytes_of(core::TreeArrays{}, triangles) + reference_count * sizeof(std::uint32_t);
+        core::bytes_of(core::TreeArrays{}, leaves) + reference_count * sizeof(std::uint32_t);
     return most;
   }
 
@@ -335,7 +350,7 @@ class Backend {
     }
   }
 
-  static constexpr int max_blocks = 16;  // a build takes three at most, a stage fourteen
+  static constexpr int max_blocks = 32;  // a build takes eleven at most, a stage twenty-five
 
   FloatEnvironment environment_;  // for the serial steps between passes
   Threads threads_;

@@ -29,10 +29,11 @@
 
 namespace zkd::cuda {
 
-/// What a tree has room for: as many leaves as triangles, and so many references.
+/// What a tree has room for.
 struct Capacity {
   std::uint64_t triangles = 0;
   std::uint64_t references = 0;
+  std::uint64_t leaves = 0;
 };
 
 /// A layout of one array.
@@ -125,7 +126,7 @@ class Backend {
     memory_.take(layout, counts...);
   }
 
-  void allocate_tree(core::Count) { memory_.take_for_tree(arrays_, capacity_.triangles); }
+  void allocate_tree(core::Count) { memory_.take_for_tree(arrays_, capacity_.leaves); }
   void allocate_references(core::Count) {
     memory_.take_for_tree(references_, capacity_.references);
   }
