@@ -118,14 +118,14 @@ TEST(ApiErrorCpu, StagesCheckTheirArguments) {
 TEST(ApiErrorCpu, TooManyReferences) {
   core::BuildCounts counts;
   counts.references_needed = max_count;
-  core::AdmitReferences{&counts, max_count}(0);
+  core::AdmitReferences{&counts, &counts.references, max_count}(0);
   EXPECT_FALSE(counts.status.failed);
   EXPECT_EQ(counts.references, max_count);
 
   const std::uint64_t needed = (std::uint64_t{1} << 32) + 5;  // 5 in 32 bits
   counts.references_needed = needed;
   counts.trunks = 7;
-  core::AdmitReferences{&counts, max_count}(0);
+  core::AdmitReferences{&counts, &counts.references, max_count}(0);
   EXPECT_EQ(counts.trunks, 0u) << "a build that failed goes on with nothing";
   EXPECT_ERROR(caught([&] { core::raise(counts.status, {}); }), ErrorCode::too_many_references,
                needed);
@@ -135,7 +135,7 @@ TEST(ApiErrorCpu, TooManyReferences) {
 TEST(ApiErrorCpu, ReferenceCapacity) {
   core::BuildCounts counts;
   counts.references_needed = 1001;
-  core::AdmitReferences{&counts, 1000}(0);
+  core::AdmitReferences{&counts, &counts.references, 1000}(0);
   const auto error = caught([&] { core::raise(counts.status, {}); });
   EXPECT_ERROR(error, ErrorCode::reference_capacity, 1001);
   EXPECT_NE(error.message.find("1000"), std::string::npos) << error.message;
@@ -178,11 +178,9 @@ TEST(ApiErrorCpu, StagesCheckTheIndicesThatTheyFollow) {
   const stages::Skeleton skeleton{ids, first, levels, children, Link::node(0), axes, planes};
   const std::vector<std::uint32_t> offsets = {0, 1, 2};
   std::vector<Node> nodes(1);
-  EXPECT_EQ(code_of([&] {
-              stages::tight_boxes(cpu::Executor{}, boxes, skeleton, References::once, offsets, ids,
-                                  nodes);
-            }),
-            ErrorCode::invalid_view);
+  EXPECT_EQ(
+      code_of([&] { stages::tight_boxes(cpu::Executor{}, boxes, skeleton, offsets, ids, nodes); }),
+      ErrorCode::invalid_view);
 
   Box infinite;
   infinite.lo[0] = infinite.lo[1] = infinite.lo[2] = 0.0F;

@@ -118,7 +118,9 @@ TEST(CudaPlan, TheWorkspaceIsUsedToItsEnd) {
     Machine machine;
     const MemoryRequirement need = memory_requirement(machine.executor(), 1000, options);
     EXPECT_GE(need.tree_bytes, 999 * sizeof(Node) + 1001 * 4 + 1000 * 4);
-    EXPECT_LE(need.workspace_bytes, 4 * 1024 * 1024u);
+    const std::uint64_t strict =
+        options.references == References::all ? options.reference_capacity * 320 : 0;
+    EXPECT_LE(need.workspace_bytes, 4 * 1024 * 1024u + strict);
   }
 }
 
@@ -188,7 +190,8 @@ TEST(CudaPlan, PassesDependOnCountsAndOptions) {
         EXPECT_TRUE(machine.stream.launches() == want) << "a rebuild is the same passes";
         EXPECT_EQ(machine.stream.synchronisations(), 0u);
       }
-      EXPECT_LE(want.size(), 45u) << "so few that small scenes are not all launches";
+      EXPECT_LE(want.size(), options.references == References::all ? 75u : 45u)
+          << "so few that small scenes are not all launches";
     }
   }
 }
@@ -336,7 +339,7 @@ void expect_replays(const BuildOptions& options, std::uint64_t seed) {
         want = tree_hash(on_cpu.view());
         if (options.references == References::all &&
             on_cpu.view().reference_count() > options.reference_capacity)
-          failure = "needs " + std::to_string(on_cpu.view().reference_count());
+          failure = "needs ";  // how many: once crowded leaves are split, or before
       } catch (const Error& error) {
         failure = error.what();
       }

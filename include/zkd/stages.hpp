@@ -147,7 +147,9 @@ struct Skeleton {
 /// Stage 10, references: which triangles each leaf (trunk) lists, by `policy`, once or all. Leaf t
 /// lists references [leaf_offsets[t], leaf_offsets[t + 1]); `leaf_offsets` is one longer than there
 /// are trunks. Returns how many references there are; as many are written as fit into `references`,
-/// so a call with an empty span asks for the number. `boxes` are stage 1's, `lattice` stage 2's.
+/// so a call with an empty span asks for the number. With `all`, `inside` gets the box of what of
+/// each reference lies in its leaf's cell, in tree space, as many as fit. `boxes` are stage 1's,
+/// `lattice` stage 2's.
 ///
 /// Throws Error too_many_references, unsupported_option; and invalid_view where an index in the
 /// skeleton is out of range. O(triangles) for once, O((triangles + references) * depth) for all.
@@ -156,18 +158,54 @@ ZKD_API std::uint64_t list_references(const Executor& executor, const TriangleVi
                                       std::span<const Box> boxes, const Skeleton& skeleton,
                                       const Lattice& lattice, References policy,
                                       std::span<std::uint32_t> leaf_offsets,
-                                      std::span<std::uint32_t> references);
+                                      std::span<std::uint32_t> references,
+                                      std::span<Box> inside = {});
 
-/// Stage 11, tight boxes: writes the finished nodes, with links, planes in tree space, and the
-/// boxes of what is inside each child. `policy` is the one that the references were listed by: with
-/// `all` a leaf's box is cut to its cell. O(references + trunks), for all O(references + trunks *
-/// depth).
+/// Where split_crowded_leaves() writes; as many of each as fit.
+struct StrictArrays {
+  std::span<Node> nodes;                  ///< links, planes in tree space; no boxes yet
+  std::span<std::uint32_t> leaf_offsets;  ///< one more than leaves
+  std::span<std::uint32_t> references;
+  std::span<Box> inside;
+};
+
+/// What it made: nodes are one less than leaves.
+struct SplitLeaves {
+  Link root;
+  std::uint32_t leaves = 0;
+  std::uint32_t references = 0;
+};
+
+/// Stage 10 again, crowded leaves of `all`: those that list more than 4 * leaf_size triangles are
+/// split. What of them lies in the cell (`inside`, with `leaf_offsets` and `references` as
+/// list_references() made them) is coded by the centre of its box, with up to 32 bits on a lattice
+/// over these centres, and trunks of at most 2 * leaf_size such codes become the leaf's subtree, in
+/// every cell of which the triangles are listed that touch it. Other leaves stay as they are.
+/// `trunk_keys` are stage 7's. Call it with empty spans first: the sizes are in what it returns.
 ///
-/// Throws Error unsupported_option; and invalid_view where an index is out of range.
+/// Throws Error too_many_references; and invalid_view where an index is out of range.
+/// O(references * depth).
+template <class Executor = cpu::Executor>
+ZKD_API SplitLeaves split_crowded_leaves(
+    const Executor& executor, const TriangleView& triangles, std::span<const Box> boxes,
+    std::span<const TrunkKey> trunk_keys, const Skeleton& skeleton,
+    std::span<const std::uint32_t> leaf_offsets, std::span<const std::uint32_t> references,
+    std::span<const Box> inside, std::uint32_t leaf_size, AxisOrder order, const StrictArrays& out);
+
+/// Stage 11, tight boxes, of `once`: writes the finished nodes, with links, planes in tree space,
+/// and the boxes of what is inside each child. O(references + trunks).
+///
+/// Throws Error invalid_view where an index is out of range.
 template <class Executor = cpu::Executor>
 ZKD_API void tight_boxes(const Executor& executor, std::span<const Box> boxes,
-                         const Skeleton& skeleton, References policy,
-                         std::span<const std::uint32_t> leaf_offsets,
+                         const Skeleton& skeleton, std::span<const std::uint32_t> leaf_offsets,
                          std::span<const std::uint32_t> references, std::span<Node> nodes);
+
+/// Stage 11 of `all`: writes the boxes of nodes that split_crowded_leaves() made: of what lies in
+/// each child's cell.
+template <class Executor = cpu::Executor>
+ZKD_API void tight_boxes(const Executor& executor, Link root,
+                         std::span<const std::uint32_t> leaf_offsets, std::span<const Box> inside,
+                         std::span<Node> nodes);
 
 }  // namespace zkd::stages

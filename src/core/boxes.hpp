@@ -15,28 +15,6 @@
 
 namespace zkd::core {
 
-/// Cuts the cell of a leaf out of the scene box: each of its six sides is the first plane met on
-/// the way up that bounds that side, since planes met later lie farther out.
-ZKD_HOST_DEVICE inline Box leaf_cell(const Node* nodes, const Parent* parents_of_nodes,
-                                     Parent parent, const Box& bounds) {
-  Box cell = bounds;
-  std::uint32_t open_sides = 0x3F;
-  while (!parent.is_none() && open_sides != 0) {
-    const Node& node = nodes[parent.node()];
-    const std::uint32_t lower = parent.side();
-    const std::uint32_t bit = 1u << (2 * node.axis + lower);
-    if ((open_sides & bit) != 0) {
-      open_sides &= ~bit;
-      if (lower != 0)
-        cell.lo[node.axis] = node.plane;
-      else
-        cell.hi[node.axis] = node.plane;
-    }
-    parent = parents_of_nodes[parent.node()];
-  }
-  return cell;
-}
-
 /// What `climb` does at a leaf and at each node it is the last to reach. Both write the box they
 /// made into the parent, and return the way up to it.
 struct TightBoxes {
@@ -46,7 +24,8 @@ struct TightBoxes {
   const Parent* parents_of_nodes;
   const Parent* parents_of_leaves;
   const SceneFrame* frame;
-  bool clip;  ///< `all`: a leaf's box is what lies in its cell
+  const Box* inside;             ///< `all`: what lies in the cells, in tree space; or null
+  const std::uint32_t* numbers;  ///< of references among those; null: 0, 1, 2, ...
   Node* nodes;
 
   ZKD_HOST_DEVICE Parent leave(Parent parent, const Box& box) const {
@@ -62,29 +41,29 @@ struct TightBoxes {
 
   /// Announces that begin(leaf) will follow: boxes lie in the order of the input, not of leaves.
   [[gnu::always_inline]] void prefetch(std::uint32_t leaf) const {
+    if (inside != nullptr) return;  // those lie in the order of the leaves
     for (std::uint32_t r = leaf_offsets[leaf]; r < leaf_offsets[leaf + 1]; ++r)
       __builtin_prefetch(boxes + references[r]);
   }
 
   ZKD_HOST_DEVICE Parent begin(std::uint32_t leaf) const {
     const Parent parent = parents_of_leaves[leaf];
-    Box cell;
-    if (clip) cell = leaf_cell(nodes, parents_of_nodes, parent, frame->bounds);
-    const float scale = static_cast<float>(frame->scale);
     Box box;
+    if (inside != nullptr) {
+      for (std::uint32_t r = leaf_offsets[leaf]; r < leaf_offsets[leaf + 1]; ++r)
+        include(box, inside[numbers != nullptr ? numbers[r] : r]);
+      return leave(parent, box);
+    }
+    const float scale = static_cast<float>(frame->scale);
     for (std::uint32_t r = leaf_offsets[leaf]; r < leaf_offsets[leaf + 1]; ++r) {
       const Box& triangle = boxes[references[r]];
-      Box inside;
+      Box placed;
       for (int a = 0; a < 3; ++a) {
         // Adding +0 turns a -0 from underflow into +0: boxes do not depend on what came first.
-        inside.lo[a] = triangle.lo[a] * scale + 0.0F;
-        inside.hi[a] = triangle.hi[a] * scale + 0.0F;
-        if (clip) {
-          inside.lo[a] = larger(inside.lo[a], cell.lo[a]);
-          inside.hi[a] = smaller(inside.hi[a], cell.hi[a]);
-        }
+        placed.lo[a] = triangle.lo[a] * scale + 0.0F;
+        placed.hi[a] = triangle.hi[a] * scale + 0.0F;
       }
-      include(box, inside);
+      include(box, placed);
     }
     return leave(parent, box);
   }

@@ -114,8 +114,6 @@ void check_predictable(const BuildOptions& options) {
              " takes is not known beforehand: memory_requirement is for others");
 }
 
-void check_cpu_options(const BuildOptions& options) {
-  check_ranges(options);
-}
+void check_cpu_options(const BuildOptions& options) { check_ranges(options); }
 
 }  // namespace zkd::core

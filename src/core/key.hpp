@@ -15,10 +15,14 @@ namespace zkd::core {
 using stages::first_fine_level;
 using stages::TrunkKey;
 
-/// Levels of a key: 64 of the code, 32 of the second round.
-inline constexpr std::uint32_t level_count = 96;
+/// Levels of a key: 64 of the code, 32 of the second round, 32 of crowded leaves' references.
+inline constexpr std::uint32_t level_count = 128;
 
-static_assert(max_depth == level_count, "every level may split once");
+/// The first of the levels inside crowded leaves. Those above may all split once; how many a leaf
+/// may use is what these leave of max_depth.
+inline constexpr std::uint32_t first_reference_level = 96;
+
+static_assert(max_depth == first_reference_level, "every level above may split once");
 
 /// The level at which two keys first differ; level_count if they are equal. The node of the
 /// conceptual tree at which they part has a prefix of this many bits.

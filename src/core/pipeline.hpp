@@ -20,6 +20,7 @@
 #include "core/boxes.hpp"
 #include "core/clusters.hpp"
 #include "core/compress.hpp"
+#include "core/crowded_leaves.hpp"
 #include "core/essential.hpp"
 #include "core/frame.hpp"
 #include "core/key.hpp"
@@ -87,6 +88,13 @@ struct Workspace {
     parents_of_leaves = arena.take<Parent>(triangles);
     arrivals = arena.take<std::uint32_t>(triangles);
   }
+};
+
+/// `all`: the tree of trunks, before it is known how many leaves there will be.
+struct SkeletonWorkspace {
+  SplitNode* nodes;
+
+  void lay_out(Arena& arena, std::size_t leaves) { nodes = arena.take<SplitNode>(leaves); }
 };
 
 /// Counts and frame from what validation found; or the end of the build.
@@ -210,6 +218,9 @@ class MortonPipeline {
     return may_split(options_) && backend_.may_exist(Count{&counts_->splits, 1});
   }
 
+  /// Whether leaves list every triangle that touches their cells.
+  [[nodiscard]] bool strict() const { return options_.references == References::all; }
+
   /// Bits that a code may have; the lattice may use fewer, whose digits the sort leaves out.
   [[nodiscard]] std::uint32_t code_bits_bound() const {
     return options_.code_bits != 0 ? options_.code_bits
@@ -302,7 +313,10 @@ class MortonPipeline {
     backend_.for_each(one, CountNodes{counts_});
     backend_.for_each(trunks(),
                       TrunkKeyOf<SortedKeys<Code>>{keys, work.trunk_first, work.trunk_keys});
-    backend_.allocate_tree(trunks());
+    if (strict())
+      backend_.take(skeleton_, backend_.size(trunks()));
+    else
+      backend_.allocate_tree(trunks());
   }
 
   void find_essential_nodes(Workspace<Code>& work) {
@@ -312,28 +326,30 @@ class MortonPipeline {
 
   void compress_paths(Workspace<Code>& work) {
     backend_.stage(Stage::path_compression);
-    const LinkWriter writer{backend_.nodes()->child, sizeof(Node) / sizeof(Link),
-                            work.parents_of_nodes,   work.parents_of_leaves,
-                            &state_->root,           &counts_->trunks};
+    const LinkWriter writer{strict() ? skeleton_.nodes->child : backend_.nodes()->child,
+                            (strict() ? sizeof(SplitNode) : sizeof(Node)) / sizeof(Link),
+                            work.parents_of_nodes,
+                            work.parents_of_leaves,
+                            &state_->root,
+                            &counts_->trunks};
     backend_.for_each(trunks(), LinkTrunk{work.levels, writer});
     backend_.for_each(nodes(), LinkEssentialNode{work.trunk_keys, work.levels, writer});
   }
 
   void split_planes(Workspace<Code>& work) {
     backend_.stage(Stage::split_planes);
-    Node* nodes = backend_.nodes();
+    const PlaneWriter writer = strict()
+                                   ? PlaneWriter{&skeleton_.nodes->axis, &skeleton_.nodes->plane,
+                                                 sizeof(SplitNode) / sizeof(float)}
+                                   : PlaneWriter{&backend_.nodes()->axis, &backend_.nodes()->plane,
+                                                 sizeof(Node) / sizeof(float)};
     const CrowdByPosition crowd{work.trunk_first, recoded_.first, &counts_->crowded_trunks,
                                 recoded_.lattices, recoded_.coders};
     const auto place = [&](const auto& scene) {
       using Scene = std::decay_t<decltype(scene)>;
-      backend_.for_each(this->nodes(),
-                        PlaceSplitPlane<Scene, CrowdByPosition>{
-                            work.trunk_keys,
-                            work.levels,
-                            scene,
-                            crowd,
-                            &state_->frame.scale,
-                            {&nodes->axis, &nodes->plane, sizeof(Node) / sizeof(float)}});
+      backend_.for_each(this->nodes(), PlaceSplitPlane<Scene, CrowdByPosition>{
+                                           work.trunk_keys, work.levels, scene, crowd,
+                                           &state_->frame.scale, writer});
     };
     if constexpr (sizeof(Code) == 8)
       if (balanced()) return place(cluster_planes_);
@@ -347,6 +363,8 @@ class MortonPipeline {
       backend_.allocate_references(listed());
       backend_.for_each(listed(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
       backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.trunk_first, backend_.leaf_offsets()});
+      backend_.for_each(
+          one, CloseOffsets{&counts_->trunks, &counts_->references, backend_.leaf_offsets()});
     } else if (splits()) {
       backend_.for_each(one, CloseTrunks{counts_, work.trunk_first});
       const TrunkOfFragments fragments{work.sort.values, work.trunk_first, split_.owners,
@@ -356,37 +374,75 @@ class MortonPipeline {
       backend_.allocate_references(Count{&counts_->references, most_});
       backend_.for_each(trunks(),
                         ListOwners{fragments, backend_.leaf_offsets(), backend_.references()});
+      backend_.for_each(
+          one, CloseOffsets{&counts_->trunks, &counts_->references, backend_.leaf_offsets()});
     } else {
-      // Memory that earlier stages are done with.
-      auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);
-      static_assert(sizeof(SplitNode) == sizeof(TrunkKey));
-      auto* split_nodes = reinterpret_cast<SplitNode*>(work.trunk_keys);
-      const CellWalk walk{triangles_,
-                          work.sort.values,
-                          trunk_of,
-                          work.boxes,
-                          split_nodes,
-                          work.levels,
-                          work.parents_of_nodes,
-                          work.parents_of_leaves,
-                          balanced() ? nullptr : &state_->coder,
-                          &state_->frame};
-      ReferenceAll<Backend>{
-          walk,    work.trunk_first, listed(),    trunks(), nodes(),
-          counts_, backend_.nodes(), split_nodes, trunk_of, work.sort.other_values}
-          .run(backend_, triangles_);
+      list_everywhere(work);
     }
-    backend_.for_each(one, CloseOffsets{counts_, backend_.leaf_offsets()});
+  }
+
+  void list_everywhere(Workspace<Code>& work) {
+    StrictTree tree{};
+    tree.leaves = trunks();
+    tree.inner = nodes();
+    tree.nodes = skeleton_.nodes;
+    tree.parents_of_nodes = work.parents_of_nodes;
+    tree.parents_of_leaves = work.parents_of_leaves;
+    tree.arrivals = work.arrivals;
+    // Memory that earlier stages are done with.
+    auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);
+    const CellWalk walk{triangles_,
+                        work.sort.values,
+                        trunk_of,
+                        work.boxes,
+                        skeleton_.nodes,
+                        work.levels,
+                        work.parents_of_nodes,
+                        work.parents_of_leaves,
+                        balanced() ? nullptr : &state_->coder,
+                        &state_->frame};
+    ReferenceAll<Backend>{walk,    work.trunk_first, listed(),
+                          counts_, trunk_of,         work.sort.other_values}
+        .run(backend_, triangles_, tree);
+    SplitCrowdedLeaves<Backend>{
+        walk,
+        work.trunk_keys,
+        options_.leaf_size,
+        options_.axis_order,
+        counts_,
+        &state_->root,
+        most_reference_trunks(backend_.reference_capacity(), triangle_count_)}
+        .run(backend_, triangles_, tree);
+    backend_.allocate_tree(tree.leaves);
+    backend_.for_each(tree.inner, FinishNode{tree.nodes, backend_.nodes()});
+    backend_.for_each(tree.leaves, CopyTo<std::uint32_t>{tree.offsets, backend_.leaf_offsets()});
+    if (tree.references.actual != &counts_->references)
+      backend_.for_each(one, CopyTo<std::uint32_t>{tree.references.actual, &counts_->references});
+    backend_.for_each(
+        one, CloseOffsets{&counts_->trunks, &counts_->references, backend_.leaf_offsets()});
+    backend_.allocate_references(tree.references);
+    backend_.for_each(tree.references,
+                      GatherTo<std::uint32_t>{tree.ids, tree.numbers, backend_.references()});
+    strict_tree_ = tree;
   }
 
   void tight_boxes(Workspace<Code>& work) {
     backend_.stage(Stage::tight_boxes);
-    backend_.for_each(nodes(), Fill{work.arrivals, 0});
-    backend_.climb(trunks(), work.arrivals,
-                   TightBoxes{work.boxes, splits() ? work.trunk_first : backend_.leaf_offsets(),
-                              splits() ? work.sort.values : backend_.references(),
-                              work.parents_of_nodes, work.parents_of_leaves, &state_->frame,
-                              options_.references == References::all, backend_.nodes()});
+    if (strict()) {
+      const StrictTree& tree = strict_tree_;
+      backend_.for_each(tree.inner, Fill{tree.arrivals, 0});
+      backend_.climb(tree.leaves, tree.arrivals,
+                     TightBoxes{work.boxes, tree.offsets, nullptr, tree.parents_of_nodes,
+                                tree.parents_of_leaves, &state_->frame, tree.inside, tree.numbers,
+                                backend_.nodes()});
+    } else {
+      backend_.for_each(nodes(), Fill{work.arrivals, 0});
+      backend_.climb(
+          trunks(), work.arrivals,
+          TightBoxes{work.boxes, splits() ? work.trunk_first : backend_.leaf_offsets(),
+                     splits() ? work.sort.values : backend_.references(), work.parents_of_nodes,
+                     work.parents_of_leaves, &state_->frame, nullptr, nullptr, backend_.nodes()});
+    }
     backend_.for_each(one, WriteHeader{state_, backend_.header()});
   }
 
@@ -401,6 +457,8 @@ class MortonPipeline {
   SplitWorkspace split_{};
   ClusterRecord clusters_{};
   ClusterPlanes cluster_planes_{};
+  SkeletonWorkspace skeleton_{};  ///< for `all`
+  StrictTree strict_tree_{};      ///< likewise
 };
 
 }  // namespace zkd::core

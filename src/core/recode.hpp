@@ -97,15 +97,20 @@ struct IncludeCentre {
 };
 
 /// The c-th crowded trunk: a lattice over its centres.
+template <class Code>
 struct CrowdedLattice {
   const WideBox* centres;
+  const Code* codes;
+  const std::uint32_t* first;
+  const std::uint8_t* most_bits;  ///< by code; null: fine_bits
   AxisOrder order;
   const SceneFrame* frame;
   Lattice* lattices;
   MortonCoder* coders;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t c) const {
-    lattices[c] = make_lattice(centres[c], fine_bits, order, frame->finest);
+    const std::uint32_t bits = most_bits != nullptr ? most_bits[codes[first[c]]] : fine_bits;
+    lattices[c] = make_lattice(centres[c], bits, order, frame->finest);
     coders[c] = MortonCoder(lattices[c]);
   }
 };
@@ -189,17 +194,26 @@ struct RecodeWorkspace {
 };
 
 /// The crowded trunks, found and counted, and where the second round has its results.
+template <class Code>
 struct CrowdedTrunks {
   const Box* boxes;
+  const Code* codes;
   std::uint32_t* ids;
+  const std::uint8_t* most_bits;  ///< by code; null: fine_bits
   AxisOrder order;
   const SceneFrame* frame;
   RecodeWorkspace work;
+
+  /// Of a second-round code in the c-th.
+  [[nodiscard]] std::uint32_t bits(std::uint32_t c) const {
+    return most_bits != nullptr ? most_bits[codes[work.first[c]]] : fine_bits;
+  }
 };
 
 /// A backend that goes through them trunk by trunk, to the same bytes.
 template <class Backend>
-concept RecodesByTrunk = requires(Backend& backend, const CrowdedTrunks& trunks, Count count) {
+concept RecodesByTrunk = requires(Backend& backend, const CrowdedTrunks<std::uint32_t>& trunks,
+                                  Count count) {
   backend.recode(trunks, count, count);
 };
 
@@ -219,10 +233,11 @@ class SecondRound {
   std::uint32_t leaf_size;
   AxisOrder order;
   const SceneFrame* frame;
-  std::uint32_t* trunk_count;      ///< out: crowded trunks
-  std::uint32_t* triangle_count;   ///< out: triangles in them
-  std::uint32_t* first_scratch;    ///< room for one number per triangle
-  std::uint32_t* offsets_scratch;  ///< likewise
+  std::uint32_t* trunk_count;               ///< out: crowded trunks
+  std::uint32_t* triangle_count;            ///< out: triangles in them
+  std::uint32_t* first_scratch;             ///< room for one number per triangle
+  std::uint32_t* offsets_scratch;           ///< likewise
+  const std::uint8_t* most_bits = nullptr;  ///< of codes again, by code; null: fine_bits
 
   RecodeWorkspace work{};
 
@@ -246,7 +261,8 @@ class SecondRound {
 
     backend.for_each(triangles, Fill{work.fine, 0});
     if constexpr (RecodesByTrunk<Backend>)
-      backend.recode(CrowdedTrunks{boxes, ids, order, frame, work}, trunks, crowded);
+      backend.recode(CrowdedTrunks<Code>{boxes, codes, ids, most_bits, order, frame, work}, trunks,
+                     crowded);
     else
       run_in_passes(backend, trunks, crowded);
   }
@@ -255,8 +271,8 @@ class SecondRound {
   void run_in_passes(Backend& backend, Count trunks, Count crowded) {
     backend.segmented_reduce(trunks, work.offsets, crowded, work.centres,
                              IncludeCentre{boxes, ids, work.first, work.offsets});
-    backend.for_each(trunks,
-                     CrowdedLattice{work.centres, order, frame, work.lattices, work.coders});
+    backend.for_each(trunks, CrowdedLattice<Code>{work.centres, codes, work.first, most_bits, order,
+                                                  frame, work.lattices, work.coders});
     backend.for_each(crowded, RecodeTriangle{boxes, ids, members(), work.lattices, work.coders,
                                              work.sort.keys, work.sort.values});
     work.sort =

@@ -15,94 +15,11 @@
 #include "core/frame.hpp"
 #include "core/key.hpp"
 #include "core/morton.hpp"
-#include "core/search.hpp"
+#include "core/polygon.hpp"
 #include "core/status.hpp"
 #include "core/verbs.hpp"
 
 namespace zkd::core {
-
-/// Relative slack of the overlap test: a triangle is taken to touch a cell that it misses by less
-/// than about this times the largest coordinate (of a sliver: times as much more as the products
-/// cancel that make its normal). Rounding moves a projection by less than 2^-50 of the products
-/// that make it, so a triangle that touches is never lost.
-inline constexpr double overlap_slack = 4.0e-14;
-
-/// A triangle in tree space, ready for overlap tests with many cells (Akenine-Moller: Fast 3D
-/// triangle-box overlap testing, 2001): its interval on each separating axis.
-struct PlacedTriangle {
-  Box box;
-  double normal[3];
-  double offset;  ///< normal . corner
-  double normal_slack;
-  // Axis a crossed with edge i, for a padded number of edges: vectors of 4 doubles.
-  double edge[4][3];
-  double lo[3][4];
-  double hi[3][4];
-
-  /// `largest` bounds the magnitude of all coordinates of scene and cells.
-  ZKD_HOST_DEVICE PlacedTriangle(const Corners& corners, double scale, double largest) {
-    double corner[3][3];
-    for (int i = 0; i < 3; ++i)
-      for (int a = 0; a < 3; ++a) {
-        corner[i][a] = static_cast<double>(corners.p[i][a]) * scale;
-        box.lo[a] = smaller(box.lo[a], static_cast<float>(corner[i][a]));
-        box.hi[a] = larger(box.hi[a], static_cast<float>(corner[i][a]));
-      }
-    for (int i = 0; i < 4; ++i)
-      for (int a = 0; a < 3; ++a) edge[i][a] = corner[(i + 1) % 3][a] - corner[i % 3][a];
-
-    const double slack = overlap_slack * largest;
-    offset = 0.0;
-    normal_slack = 0.0;
-    for (int a = 0; a < 3; ++a) {
-      const int b = (a + 1) % 3;
-      const int c = (a + 2) % 3;
-      const double left = edge[0][b] * edge[1][c];
-      const double right = edge[0][c] * edge[1][b];
-      normal[a] = left - right;
-      offset += normal[a] * corner[0][a];
-      normal_slack += slack * (magnitude(left) + magnitude(right));
-      for (int i = 0; i < 4; ++i) {
-        const double* e = edge[i];
-        const double* on_edge = corner[i % 3];
-        const double* opposite = corner[(i + 2) % 3];
-        const double p = e[b] * on_edge[c] - e[c] * on_edge[b];
-        const double q = e[b] * opposite[c] - e[c] * opposite[b];
-        const double edge_slack = slack * (magnitude(e[b]) + magnitude(e[c]));
-        lo[a][i] = smaller(p, q) - edge_slack;
-        hi[a][i] = larger(p, q) + edge_slack;
-      }
-    }
-  }
-
-  /// Whether the triangle touches a closed cell that its box touches, with overlap_slack.
-  [[nodiscard]] ZKD_HOST_DEVICE bool touches(const Box& cell) const {
-    double middle[3];
-    double half[3];
-    double distance = -offset;
-    double reach = normal_slack;
-    for (int a = 0; a < 3; ++a) {
-      const double low = static_cast<double>(cell.lo[a]);
-      const double high = static_cast<double>(cell.hi[a]);
-      middle[a] = 0.5 * (low + high);
-      half[a] = 0.5 * (high - low);
-      distance += normal[a] * middle[a];
-      reach += half[a] * magnitude(normal[a]);
-    }
-    if (magnitude(distance) > reach) return false;
-    bool apart = false;
-    for (int a = 0; a < 3; ++a) {
-      const int b = (a + 1) % 3;
-      const int c = (a + 2) % 3;
-      for (int i = 0; i < 4; ++i) {
-        const double at = edge[i][b] * middle[c] - edge[i][c] * middle[b];
-        const double radius = half[b] * magnitude(edge[i][c]) + half[c] * magnitude(edge[i][b]);
-        apart |= (lo[a][i] - at > radius) | (at - hi[a][i] > radius);
-      }
-    }
-    return !apart;
-  }
-};
 
 /// Notes for every triangle of a trunk, by position, which trunk that is.
 struct LabelTrunk {
@@ -124,18 +41,9 @@ struct SplitNode {
   Link child[2];
 };
 
-struct CopySplitNode {
-  const Node* nodes;
-  SplitNode* split_nodes;
-
-  ZKD_HOST_DEVICE void operator()(std::uint32_t index) const {
-    const Node& node = nodes[index];
-    split_nodes[index] = {node.plane, node.axis, {node.child[0], node.child[1]}};
-  }
-};
-
-/// Walks the cells of a tree whose planes and links are finished, and calls visit(leaf) for every
-/// leaf cell that the i-th sorted triangle touches, in the order of the leaves.
+/// Walks the cells of a tree whose planes and links are finished, and calls visit(leaf, box) for
+/// every leaf cell that the i-th sorted triangle touches, in the order of the leaves, with the box
+/// of what of it lies there.
 ///
 /// The walk begins at the lowest node whose cell holds the triangle's whole box: up from its own
 /// trunk to the first level that has a plane across the box. Of cells only the part inside that box
@@ -168,6 +76,18 @@ struct CellWalk {
     return link;
   }
 
+  /// The triangle's box in tree space.
+  [[nodiscard]] ZKD_HOST_DEVICE Box place(std::uint32_t id) const {
+    const float scale = static_cast<float>(frame->scale);
+    Box box;
+    for (int a = 0; a < 3; ++a) {
+      // Adding +0 turns a -0 from underflow into +0: boxes do not depend on what came first.
+      box.lo[a] = boxes[id].lo[a] * scale + 0.0F;
+      box.hi[a] = boxes[id].hi[a] * scale + 0.0F;
+    }
+    return box;
+  }
+
   /// A node or leaf still to be visited. Without initialisers: a stack of them costs nothing.
   struct Waiting {
     std::uint32_t link;
@@ -175,133 +95,236 @@ struct CellWalk {
     float hi[3];
   };
 
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t id(std::uint32_t i) const { return ids[i]; }
+
   template <class Visit>
   ZKD_HOST_DEVICE void operator()(std::uint32_t i, Visit& visit) const {
-    const PlacedTriangle placed(corners_of(triangles, ids[i]), frame->scale, frame->largest);
+    const Link from = start(i);
+    const Box box = place(ids[i]);
+    if (from.is_leaf())
+      visit(from.index(), box);
+    else
+      below(ids[i], from, box, box, visit);
+  }
+
+  /// The leaves below `link` that what lies in `cell` of triangle `id` touches; `whole` is the
+  /// triangle's box, and the cell in it.
+  template <class Visit>
+  ZKD_HOST_DEVICE void below(std::uint32_t id, Link link, const Box& whole, Box cell,
+                             Visit& visit) const {
+    const double slack = cell_slack * frame->largest;
+    const Corners corners = corners_of(triangles, id);
     Waiting stack[max_depth];
     std::uint32_t waiting = 0;
-    Link link = start(i);
-    Box cell = placed.box;  // of the node, cut to the box
+    // That of the cell, one to cut it into, and those of the cells that have waited longest. Slots
+    // change hands: polygons are too large to be moved.
+    Polygon room[kept_polygons + 2];
+    std::uint32_t slots[kept_polygons];
+    for (std::uint32_t i = 0; i < kept_polygons; ++i) slots[i] = i;
+    std::uint32_t current = kept_polygons;
+    std::uint32_t spare = kept_polygons + 1;
+    const auto cut = [&](std::uint32_t a, double h, double sign) {
+      room[spare].cut(room[current], a, h, sign);
+      exchange(current, spare);
+    };
+    // The polygon of `cell`, from the triangle. By rounding nothing may be left: then nothing was.
+    const auto take_up = [&] {
+      room[current].place(corners, frame->scale);
+      for (std::uint32_t a = 0; a < 3; ++a) {
+        const double low = static_cast<double>(cell.lo[a]) - slack;
+        const double high = static_cast<double>(cell.hi[a]) + slack;
+        if (room[current].hi[a] < low || room[current].lo[a] > high) return false;
+        if (cell.lo[a] > whole.lo[a] && room[current].lo[a] < low) cut(a, low, -1.0);
+        if (room[current].lo[a] > high) return false;
+        if (cell.hi[a] < whole.hi[a] && room[current].hi[a] > high) cut(a, high, 1.0);
+      }
+      return true;
+    };
+    if (!take_up()) return;
     for (;;) {
-      bool dead_end = false;
-      while (!link.is_leaf() && !dead_end) {
+      while (!link.is_leaf()) {
         const SplitNode& node = nodes[link.index()];
-        const bool below = placed.box.lo[node.axis] <= node.plane;
-        const bool above = placed.box.hi[node.axis] >= node.plane;
-        if (!(below && above)) {
-          link = node.child[above ? 1 : 0];
+        const std::uint32_t axis = node.axis;
+        const double plane = static_cast<double>(node.plane);
+        // The box is exact, so that the slack takes nothing in where it says no.
+        const bool in_lower =
+            element(cell.lo, axis) <= node.plane && room[current].lo[axis] <= plane + slack;
+        const bool in_upper = !in_lower || (element(cell.hi, axis) >= node.plane &&
+                                            room[current].hi[axis] >= plane - slack);
+        link = node.child[in_lower ? 0 : 1];
+        if (!(in_lower && in_upper)) {
+          for (std::uint32_t a = 0; a < 3; ++a) {
+            if (a != axis) continue;
+            cell.lo[a] = in_lower ? cell.lo[a] : larger(cell.lo[a], node.plane);
+            cell.hi[a] = in_lower ? smaller(cell.hi[a], node.plane) : cell.hi[a];
+          }
           continue;
         }
-        Box lower = cell;
-        Box upper = cell;
-        bool within = true;
-        for (std::uint32_t a = 0; a < 3;
-             ++a) {  // no indexing by a variable: boxes stay in registers
-          const bool split = a == node.axis;
-          lower.hi[a] = split ? node.plane : cell.hi[a];
-          upper.lo[a] = split ? node.plane : cell.lo[a];
-          within = within &&
-                   (split || (cell.lo[a] == placed.box.lo[a] && cell.hi[a] == placed.box.hi[a]));
+        Waiting& later = stack[waiting];
+        later.link = node.child[1].bits;
+        for (std::uint32_t a = 0; a < 3; ++a) {  // no indexing by a variable: it stays in registers
+          later.lo[a] = a == axis ? node.plane : cell.lo[a];
+          later.hi[a] = cell.hi[a];
+          cell.hi[a] = a == axis ? node.plane : cell.hi[a];
         }
-        // Where the cell cut nothing off the triangle along the two other axes, the triangle spans
-        // it along this one, and is on both sides of the plane.
-        const bool in_lower = within || placed.touches(lower);
-        const bool in_upper = within || placed.touches(upper);
-        if (in_lower && in_upper) {
-          Waiting& later = stack[waiting++];
-          later.link = node.child[1].bits;
-          for (int a = 0; a < 3; ++a) {
-            later.lo[a] = upper.lo[a];
-            later.hi[a] = upper.hi[a];
-          }
-        }
-        link = node.child[in_lower ? 0 : 1];
-        cell = in_lower ? lower : upper;
-        dead_end = !in_lower && !in_upper;
+        if (waiting < kept_polygons)
+          room[slots[waiting]].cut(room[current], axis, plane - slack, -1.0);
+        ++waiting;
+        cut(axis, plane + slack, 1.0);
       }
-      if (!dead_end) visit(link.index());
-      if (waiting == 0) return;
-      const Waiting& next = stack[--waiting];
-      link = Link{next.link};
-      for (int a = 0; a < 3; ++a) {
-        cell.lo[a] = next.lo[a];
-        cell.hi[a] = next.hi[a];
+      visit(link.index(), box_inside(room[current], cell, slack));
+      bool found = false;
+      while (!found) {
+        if (waiting == 0) return;
+        const Waiting& next = stack[--waiting];
+        link = Link{next.link};
+        for (int a = 0; a < 3; ++a) {
+          cell.lo[a] = next.lo[a];
+          cell.hi[a] = next.hi[a];
+        }
+        if (waiting < kept_polygons) {
+          exchange(current, slots[waiting]);
+          found = true;
+        } else {
+          found = take_up();
+        }
       }
     }
   }
+
+  /// Polygons that wait with their cells; that of a cell above those is made again.
+  static constexpr std::uint32_t kept_polygons = 4;
+
+  ZKD_HOST_DEVICE static void exchange(std::uint32_t& a, std::uint32_t& b) {
+    const std::uint32_t was = a;
+    a = b;
+    b = was;
+  }
 };
 
-/// Leaves of a triangle that are remembered while counting, so that most triangles need one walk.
-inline constexpr std::uint32_t remembered = 8;
+inline constexpr std::uint32_t not_noted = 0xFFFFFFFFu;
 
-/// How many leaves list the i-th sorted triangle; notes the first of them.
+/// A leaf that lists a triangle, and the box of what of it lies there.
+struct NotedReference {
+  std::uint32_t leaf;
+  Box inside;
+};
+
+/// How many leaves list the i-th of what `walk` walks for; notes them, so that most need one walk.
+/// There is room for `remembered` each, and what those before have left: notes of neighbours follow
+/// one another.
+template <class Walk>
 struct CountReferences {
-  CellWalk walk;
-  std::uint32_t* notes;  ///< `remembered` leaves per triangle
+  Walk walk;
+  NotedReference* notes;
+  std::uint32_t* noted_at;  ///< where those of the i-th begin; not_noted: there was no room
+  std::uint32_t remembered;
+  std::uint64_t next = 0;
+  std::uint64_t last = ~std::uint64_t{0} - 1;
 
   struct Counter {
-    std::uint32_t* notes;
+    NotedReference* notes;
+    std::uint64_t room;
     std::uint32_t count = 0;
-    ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) {
-      if (count < remembered) notes[count] = leaf;
+    ZKD_HOST_DEVICE void operator()(std::uint32_t leaf, const Box& inside) {
+      if (count < room) notes[count] = {leaf, inside};
       ++count;
     }
   };
-  ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t i) const {
-    Counter counter{notes + std::size_t{i} * remembered};
+  ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t i) {
+    if (i != last + 1) next = std::uint64_t{i} * remembered;
+    last = i;
+    Counter counter{notes + next, (std::uint64_t{i} + 1) * remembered - next};
     walk(i, counter);
+    const bool noted = counter.count <= counter.room && next < not_noted;
+    noted_at[i] = noted ? static_cast<std::uint32_t>(next) : not_noted;
+    if (noted) next += counter.count;
     return counter.count;
   }
 };
 
-/// Writes the (leaf, triangle) pairs of the i-th sorted triangle.
-struct WriteReferences {
-  CellWalk walk;
-  const std::uint32_t* notes;
-  const std::uint32_t* offsets;
-  const std::uint32_t* triangle_count;
-  const std::uint32_t* reference_count;
+/// What is known of each reference, in the order in which walks find them.
+struct FoundReferences {
   std::uint32_t* leaves;
-  std::uint32_t* references;
+  std::uint32_t* ids;
+  Box* inside;
+};
+
+/// Writes down the references of the i-th of them.
+template <class Walk>
+struct WriteReferences {
+  Walk walk;
+  const NotedReference* notes;
+  const std::uint32_t* noted_at;
+  const std::uint32_t* offsets;
+  const std::uint32_t* count;
+  const std::uint32_t* reference_count;
+  FoundReferences to;
 
   struct Writer {
-    std::uint32_t* leaves;
-    std::uint32_t* references;
+    FoundReferences to;
     std::uint32_t id;
-    ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) {
-      *leaves++ = leaf;
-      *references++ = id;
+    std::uint32_t next;
+    ZKD_HOST_DEVICE void operator()(std::uint32_t leaf, const Box& inside) {
+      to.leaves[next] = leaf;
+      to.ids[next] = id;
+      to.inside[next] = inside;
+      ++next;
     }
   };
   ZKD_HOST_DEVICE void operator()(std::uint32_t i) const {
-    Writer writer{leaves + offsets[i], references + offsets[i], walk.ids[i]};
-    const std::uint32_t end = i + 1 < *triangle_count ? offsets[i + 1] : *reference_count;
-    const std::uint32_t count = end - offsets[i];
-    if (count <= remembered)
-      for (std::uint32_t r = 0; r < count; ++r) writer(notes[std::size_t{i} * remembered + r]);
+    Writer writer{to, walk.id(i), offsets[i]};
+    const std::uint32_t end = i + 1 < *count ? offsets[i + 1] : *reference_count;
+    const std::uint32_t at = noted_at[i];
+    if (at != not_noted)
+      for (std::uint32_t r = 0; r < end - offsets[i]; ++r)
+        writer(notes[at + r].leaf, notes[at + r].inside);
     else
       walk(i, writer);
   }
 };
 
-/// The offset of leaf `leaf` among references sorted by leaf; a leaf may be empty.
-struct LeafOffset {
+/// to[i] = from[numbers[i]]
+template <class T>
+struct GatherTo {
+  const T* from;
+  const std::uint32_t* numbers;
+  T* to;
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const { to[i] = from[numbers[i]]; }
+};
+
+/// The offsets of the leaves from that of the reference before, sorted by leaf, to that of the
+/// r-th: most begin where their first reference is, and empty ones with them.
+struct LeafOffsets {
   const std::uint32_t* leaves;
-  const std::uint32_t* reference_count;
   std::uint32_t* offsets;
 
-  ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) const {
-    offsets[leaf] = first_not_below(leaves, *reference_count, leaf);
+  ZKD_HOST_DEVICE void operator()(std::uint32_t r) const {
+    for (std::uint32_t leaf = r == 0 ? 0 : leaves[r - 1] + 1; leaf <= leaves[r]; ++leaf)
+      offsets[leaf] = r;
   }
 };
 
 /// Puts the end behind the offsets of all leaves.
 struct CloseOffsets {
-  const BuildCounts* counts;
+  const std::uint32_t* leaves;
+  const std::uint32_t* references;
   std::uint32_t* leaf_offsets;
 
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const { leaf_offsets[*leaves] = *references; }
+};
+
+/// The same where the last leaves may be empty.
+struct CloseLeaves {
+  const std::uint32_t* leaves;  ///< of references, sorted
+  const std::uint32_t* leaf_count;
+  const std::uint32_t* reference_count;
+  std::uint32_t* offsets;
+
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
-    leaf_offsets[counts->trunks] = counts->references;
+    const std::uint32_t count = *reference_count;
+    for (std::uint32_t leaf = count == 0 ? 0 : leaves[count - 1] + 1; leaf <= *leaf_count; ++leaf)
+      offsets[leaf] = count;
   }
 };
 
@@ -312,59 +335,131 @@ struct ReferenceEachOnce {
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const { counts->references = counts->listed; }
 };
 
-/// For References::all.
-struct ReferenceWorkspace {
-  SortBuffers<std::uint32_t> sort;  ///< keys: leaves; values: triangles
+/// A strict tree while it is being made.
+struct StrictTree {
+  Count leaves;
+  Count inner;
+  const SplitNode* nodes;
+  const Parent* parents_of_nodes;
+  const Parent* parents_of_leaves;
+  std::uint32_t* arrivals;
 
-  void lay_out(Arena& arena, std::size_t references) {
+  // Made by FindReferences. In the order of the leaves:
+  Count references;
+  const std::uint32_t* offsets;  ///< of leaves, and the end
+  const std::uint32_t* leaf_of;
+  std::uint32_t* numbers;
+  // By number:
+  const std::uint32_t* ids;  ///< of triangles
+  const Box* inside;         ///< what lies in the leaf's cell, in tree space
+};
+
+/// References noted while counting.
+struct NotesWorkspace {
+  NotedReference* notes;
+  std::uint32_t* noted_at;
+
+  void lay_out(Arena& arena, std::size_t walks, std::size_t remembered) {
+    notes = arena.take<NotedReference>(walks * remembered);
+    noted_at = arena.take<std::uint32_t>(walks);
+  }
+};
+
+/// Counts references, takes `arrays` for them (leaves by leaves, room for one more offset), and
+/// writes them down.
+template <class Walk, class Backend>
+struct FindReferences {
+  Walk walk;
+  Count walks;
+  std::uint32_t remembered;   ///< leaves of one walk
+  BuildCounts* counts;        ///< `references_needed` is made
+  std::uint32_t* references;  ///< and this, in it
+  std::uint32_t* offsets;     ///< made: of each walk's references
+
+  /// Returns how many there are.
+  template <class Workspace>
+  Count run(Backend& backend, const TriangleView& view, Count leaves, Workspace& work) {
+    NotesWorkspace noted{};
+    backend.take(noted, backend.size(walks), std::size_t{remembered});
+    backend.exclusive_scan(walks,
+                           CountReferences<Walk>{walk, noted.notes, noted.noted_at, remembered},
+                           offsets, &counts->references_needed);
+    const std::uint64_t capacity = backend.reference_capacity();
+    backend.for_each(one, AdmitReferences{counts, references, capacity});
+    backend.raise(&counts->status, view);
+    Count found{references, static_cast<std::uint32_t>(capacity)};
+    found.bound = backend.size(found);
+    backend.take(work, found.bound, backend.size(leaves));
+    backend.for_each(walks, WriteReferences<Walk>{walk, noted.notes, noted.noted_at, offsets,
+                                                  walks.actual, references, work.found()});
+    return found;
+  }
+};
+
+/// References of triangles, and room to sort them by leaf.
+struct ReferenceWorkspace {
+  SortBuffers<std::uint32_t> sort;  ///< keys: leaves; values: numbers
+  std::uint32_t* ids;
+  Box* inside;
+  std::uint32_t* offsets;
+
+  void lay_out(Arena& arena, std::size_t references, std::size_t leaves) {
     sort = {arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references),
             arena.take<std::uint32_t>(references), arena.take<std::uint32_t>(references)};
+    ids = arena.take<std::uint32_t>(references);
+    inside = arena.take<Box>(references);
+    offsets = arena.take<std::uint32_t>(leaves + 1);
   }
+  [[nodiscard]] FoundReferences found() const { return {sort.keys, ids, inside}; }
 };
 
-/// Leaves noted while counting: `remembered` for each triangle.
-struct NotesWorkspace {
-  std::uint32_t* notes;
+/// Leaves of a triangle that are remembered.
+inline constexpr std::uint32_t remembered_of_triangle = 6;
 
-  void lay_out(Arena& arena, std::size_t triangles) {
-    notes = arena.take<std::uint32_t>(triangles * remembered);
-  }
-};
-
-/// `all`, start to end: count, write (leaf, triangle) pairs, sort them by leaf.
+/// `all`, but for crowded leaves: every triangle in every leaf cell it touches.
 template <class Backend>
 struct ReferenceAll {
   CellWalk walk;
   const std::uint32_t* trunk_first;
   Count triangles;
-  Count trunks;
-  Count node_count;
-  BuildCounts* counts;  ///< what those three count; `references_needed` and `references` are made
-  const Node* nodes;
-  SplitNode* split_nodes;   ///< room for one per node; what `walk` reads
-  std::uint32_t* trunk_of;  ///< room for one number per triangle; likewise
+  BuildCounts* counts;
+  std::uint32_t* trunk_of;  ///< room for one number per triangle; what `walk` reads
   std::uint32_t* offsets;   ///< likewise
 
-  void run(Backend& backend, const TriangleView& view) {
-    backend.for_each(node_count, CopySplitNode{nodes, split_nodes});
-    backend.for_each(trunks, LabelTrunk{trunk_first, trunks.actual, triangles.actual, trunk_of});
-    NotesWorkspace noted{};
-    backend.take(noted, triangles.bound);
-    backend.exclusive_scan(triangles, CountReferences{walk, noted.notes}, offsets,
-                           &counts->references_needed);
-    const std::uint64_t capacity = backend.reference_capacity();
-    backend.for_each(one, AdmitReferences{counts, capacity});
-    backend.raise(&counts->status, view);
-    const std::uint32_t* count = &counts->references;
-    const Count references{count, static_cast<std::uint32_t>(capacity)};
-    ReferenceWorkspace pairs{};
-    backend.take(pairs, backend.size(references));
-    backend.for_each(triangles, WriteReferences{walk, noted.notes, offsets, triangles.actual, count,
-                                                pairs.sort.keys, pairs.sort.values});
-    pairs.sort = backend.radix_sort(pairs.sort, references, bits_to_count(backend.size(trunks)));
-    backend.allocate_references(references);
-    backend.for_each(references, CopyTo<std::uint32_t>{pairs.sort.values, backend.references()});
-    backend.for_each(trunks, LeafOffset{pairs.sort.keys, count, backend.leaf_offsets()});
+  void run(Backend& backend, const TriangleView& view, StrictTree& tree) {
+    backend.for_each(tree.leaves,
+                     LabelTrunk{trunk_first, tree.leaves.actual, triangles.actual, trunk_of});
+    ReferenceWorkspace work{};
+    tree.references =
+        FindReferences<CellWalk, Backend>{
+            walk, triangles, remembered_of_triangle, counts, &counts->first_references, offsets}
+            .run(backend, view, tree.leaves, work);
+    backend.for_each(tree.references, Number{work.sort.values});
+    work.sort =
+        backend.radix_sort(work.sort, tree.references, bits_to_count(backend.size(tree.leaves)));
+    const std::uint32_t* count = tree.references.actual;
+    backend.for_each(tree.references, LeafOffsets{work.sort.keys, work.offsets});
+    backend.for_each(one, CloseLeaves{work.sort.keys, tree.leaves.actual, count, work.offsets});
+    tree.offsets = work.offsets;
+    tree.leaf_of = work.sort.keys;
+    tree.numbers = work.sort.values;
+    tree.ids = work.ids;
+    tree.inside = work.inside;
+  }
+};
+
+/// The tree's node from what was made of it before its boxes.
+struct FinishNode {
+  const SplitNode* split_nodes;
+  Node* nodes;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t index) const {
+    const SplitNode& from = split_nodes[index];
+    Node& node = nodes[index];
+    node.child[0] = from.child[0];
+    node.child[1] = from.child[1];
+    node.plane = from.plane;
+    node.axis = from.axis;
   }
 };
 

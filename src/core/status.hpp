@@ -40,14 +40,21 @@ struct BuildCounts {
   std::uint32_t trunks = 0;
   std::uint32_t nodes = 0;
   std::uint32_t references = 0;
-  std::uint32_t fragments = 0;  ///< of References::budget, places that stay empty included
-  std::uint32_t splits = 0;     ///< 1: triangles are split
+  std::uint32_t fragments = 0;         ///< of References::budget, places that stay empty included
+  std::uint32_t splits = 0;            ///< 1: triangles are split
+  std::uint32_t first_trunks = 0;      ///< `all`: before crowded leaves are split
+  std::uint32_t first_references = 0;  ///< likewise
+  std::uint32_t crowded_leaves = 0;
+  std::uint32_t crowded_references = 0;  ///< in them
+  std::uint32_t reference_trunks = 0;    ///< leaves after that
+  std::uint32_t unused = 0;              ///< no padding: see BuildState
   std::uint64_t references_needed = 0;
 
   ZKD_HOST_DEVICE void fail(ErrorCode code, std::uint64_t offender, std::uint64_t first = 0,
                             std::uint64_t second = 0) {
     status = {1, code, offender, {first, second}};
-    given = listed = left_out = trunks = nodes = references = fragments = 0;
+    given = listed = left_out = trunks = nodes = references = fragments = first_references = 0;
+    first_trunks = crowded_leaves = crowded_references = reference_trunks = 0;
   }
 };
 
@@ -69,7 +76,8 @@ ZKD_HOST_DEVICE inline void judge(const ValidationReport& report, const Triangle
 /// Whether a tree may have as many references as it needs; stops the build if not.
 struct AdmitReferences {
   BuildCounts* counts;
-  std::uint64_t capacity;  ///< max_count, or less where room was made beforehand
+  std::uint32_t* references;  ///< in `counts`: how many there are
+  std::uint64_t capacity;     ///< max_count, or less where room was made beforehand
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
     const std::uint64_t needed = counts->references_needed;
@@ -78,7 +86,7 @@ struct AdmitReferences {
     else if (needed > capacity)
       counts->fail(ErrorCode::reference_capacity, needed, capacity);
     else
-      counts->references = static_cast<std::uint32_t>(needed);
+      *references = static_cast<std::uint32_t>(needed);
   }
 };
 

@@ -248,7 +248,8 @@ class Backend {
 
   /// Each thread takes whole trunks. One that is so large that others would wait for it is done by
   /// all threads, in passes.
-  void recode(const core::CrowdedTrunks& trunks, core::Count count, core::Count triangles) {
+  template <class Code>
+  void recode(const core::CrowdedTrunks<Code>& trunks, core::Count count, core::Count triangles) {
     const std::uint32_t n = size(count);
     const std::uint32_t all = size(triangles);
     const std::uint32_t* const offsets = trunks.work.offsets;
@@ -262,7 +263,7 @@ class Backend {
       if (length(c) > most) recode_large(trunks, members, c, length(c));
     const auto trunks_a_grain = static_cast<std::uint32_t>(grain * n / all + 1);
     threads_.share(n, trunks_a_grain, [=](Range range) {
-      const RecodeTrunk recode{trunks};
+      const RecodeTrunk<Code> recode{trunks};
       for (std::uint32_t c = range.begin; c < range.end; ++c)
         if (length(c) <= most) recode(c, length(c));
     });
@@ -370,20 +371,35 @@ class Backend {
       most.workspace_bytes +=
           core::bytes_of(core::RecodeWorkspace{}, triangles, crowded, crowded > 0 ? triangles : 0);
     }
-    if (options.references == References::all)
-      most.workspace_bytes += core::bytes_of(core::NotesWorkspace{}, triangles) +
-                              core::bytes_of(core::ReferenceWorkspace{}, reference_count);
     if (core::may_split(options))
       most.workspace_bytes += core::bytes_of(core::SplitWorkspace{}, triangle_count, triangles);
     if (options.quality == Quality::balanced)
       most.workspace_bytes +=
           core::bytes_of(core::ClusterRecord{}, 1u) +
           core::bytes_of(core::ClusterWorkspace{}, core::most_clusters(triangles));
+    const std::uint64_t leaves = options.references == References::all
+                                     ? core::most_reference_trunks(reference_count, triangles)
+                                     : triangles;
+    if (options.references == References::all) {
+      const auto references = static_cast<std::uint32_t>(reference_count);
+      const std::uint32_t crowded =
+          core::most_crowded_trunks(references, core::crowded_factor * options.leaf_size);
+      most.workspace_bytes +=
+          core::bytes_of(core::SkeletonWorkspace{}, triangles) +
+          core::bytes_of(core::NotesWorkspace{}, triangles, core::remembered_of_triangle) +
+          core::bytes_of(core::ReferenceWorkspace{}, references, triangles) +
+          core::bytes_of(core::CrowdedLeavesWorkspace{}, references, triangles) +
+          core::bytes_of(core::RecodeWorkspace{}, references, crowded, references) +
+          core::bytes_of(core::ReferenceTrunkWorkspace{}, references, triangles) +
+          core::bytes_of(core::SubtreeWorkspace{}, leaves) +
+          core::bytes_of(core::NotesWorkspace{}, references, core::remembered_of_reference) +
+          core::bytes_of(core::SplitReferenceWorkspace{}, references, leaves);
+    }
     // Of what single verbs take for themselves, a sort by 64 bits takes most.
     const int team = Threads(executor).team(std::max<std::uint64_t>(triangles, reference_count));
     most.workspace_bytes += core::bytes_of(SortScratch{}, team, digits_of(64));
     most.tree_bytes =
-        core::bytes_of(core::TreeArrays{}, triangles) + reference_count * sizeof(std::uint32_t);
+        core::bytes_of(core::TreeArrays{}, leaves) + reference_count * sizeof(std::uint32_t);
     return most;
   }
 
@@ -467,7 +483,8 @@ class Backend {
   }
 
   /// The passes of core::SecondRound over one trunk.
-  void recode_large(const core::CrowdedTrunks& trunks, const core::CrowdedTriangles& members,
+  template <class Code>
+  void recode_large(const core::CrowdedTrunks<Code>& trunks, const core::CrowdedTriangles& members,
                     std::uint32_t c, std::uint32_t n) {
     const core::RecodeWorkspace& work = trunks.work;
     const std::uint32_t offset = work.offsets[c];
@@ -476,7 +493,8 @@ class Backend {
            [c, offset,
             include = core::IncludeCentre{trunks.boxes, trunks.ids, work.first, work.offsets}](
                std::uint32_t i, core::WideBox& box) { include(c, offset + i, box); });
-    core::CrowdedLattice{work.centres, trunks.order, trunks.frame, work.lattices, work.coders}(c);
+    core::CrowdedLattice<Code>{work.centres, trunks.codes, work.first,    trunks.most_bits,
+                               trunks.order, trunks.frame, work.lattices, work.coders}(c);
     for_each(count, [offset, recode = core::RecodeTriangle{
                                  trunks.boxes, trunks.ids, members, work.lattices, work.coders,
                                  work.sort.keys, work.sort.values, c}](std::uint32_t i) mutable {
@@ -528,7 +546,7 @@ class Backend {
     }
   }
 
-  static constexpr int max_blocks = 16;  // a build takes three at most, a stage fourteen
+  static constexpr int max_blocks = 32;  // a build takes eleven at most, a stage twenty-five
 
   FloatEnvironment environment_;  // for the serial steps between passes
   Threads threads_;

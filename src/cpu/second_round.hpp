@@ -84,8 +84,9 @@ class EncodeBlock {
 };
 
 /// One crowded trunk, start to end.
+template <class Code>
 struct RecodeTrunk {
-  core::CrowdedTrunks trunks;
+  core::CrowdedTrunks<Code> trunks;
 
   void operator()(std::uint32_t c, std::uint32_t count) const {
     const core::RecodeWorkspace& work = trunks.work;
@@ -101,7 +102,7 @@ struct RecodeTrunk {
       centres.include({core::centre(box, 0), core::centre(box, 1), core::centre(box, 2)});
     }
     const Lattice lattice =
-        core::make_lattice(centres, core::fine_bits, trunks.order, trunks.frame->finest);
+        core::make_lattice(centres, trunks.bits(c), trunks.order, trunks.frame->finest);
     const core::MortonCoder coder(lattice);
     work.lattices[c] = lattice;
     work.coders[c] = coder;

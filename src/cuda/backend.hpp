@@ -32,8 +32,8 @@ namespace zkd::cuda {
 
 /// What a tree has room for.
 struct Capacity {
-  std::uint64_t leaves = 0;
   std::uint64_t references = 0;
+  std::uint64_t leaves = 0;
 };
 
 /// A layout of one array.

@@ -58,8 +58,12 @@ struct TreeAccess {
 };
 
 inline Capacity capacity_for(std::uint64_t triangles, const BuildOptions& options) {
-  const std::uint64_t leaves = core::most_elements(options, static_cast<std::uint32_t>(triangles));
-  return {leaves, options.references == References::all ? options.reference_capacity : leaves};
+  if (options.references != References::all) {
+    const std::uint64_t most = core::most_elements(options, static_cast<std::uint32_t>(triangles));
+    return {most, most};
+  }
+  const std::uint64_t references = options.reference_capacity;
+  return {references, core::most_reference_trunks(references, triangles)};
 }
 
 /// What the passes left in the tree's block.
@@ -319,9 +323,15 @@ BuildOptions analyse_on(Device& device, const Executor& executor, const Triangle
     return found;
   }
   found.reference_capacity = 0;  // so that the build ends when it has counted
-  Tree tree = build_with(device, executor, triangles, found);
   core::BuildState state{};
-  device.copy_to_host(&state, TreeAccess{tree}.record(), sizeof state);
+  // With `all` once more where crowded leaves are split: how many references that takes is known
+  // when there is room for those before.
+  for (int round = 0; round < 2; ++round) {
+    Tree tree = build_with(device, executor, triangles, found);
+    device.copy_to_host(&state, TreeAccess{tree}.record(), sizeof state);
+    if (state.counts.status.code != ErrorCode::reference_capacity) break;
+    found.reference_capacity = state.counts.references_needed;
+  }
   if (state.counts.status.code != ErrorCode::reference_capacity)
     core::raise(state.counts.status, triangles);
   found = core::used_options(state, options, zkd::Backend::cuda);

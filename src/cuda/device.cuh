@@ -156,7 +156,7 @@ struct WriteValue {
   __device__ void load() {
     if constexpr (core::Loads<Functor>) f.load();
   }
-  __device__ void operator()(std::uint32_t i) const { values[i] = f(i); }
+  __device__ void operator()(std::uint32_t i) { values[i] = f(i); }
 };
 
 template <class Total>

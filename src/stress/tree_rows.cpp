@@ -115,7 +115,7 @@ void mocked_counts(const Setting&, Findings& findings) {
                                      past_32 + max_count, std::uint64_t{1} << 62}) {
     core::BuildCounts counts;
     counts.references_needed = needed;
-    core::AdmitReferences{&counts, max_count}(0);
+    core::AdmitReferences{&counts, &counts.references, max_count}(0);
     if (needed <= max_count) {
       findings.expect(counts.status.failed == 0 && counts.references == needed,
                       "2^31 - 1 references are refused");

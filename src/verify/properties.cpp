@@ -30,10 +30,6 @@ void grow(ExactBox& box, const ExactBox& by) {
   }
 }
 
-bool empty(const ExactBox& box) {
-  return !(box.lo[0] <= box.hi[0] && box.lo[1] <= box.hi[1] && box.lo[2] <= box.hi[2]);
-}
-
 ExactBox box_of(const Corners& corners) {
   ExactBox box = empty_box();
   for (const Point& corner : corners) grow(box, {corner, corner});
@@ -77,8 +73,8 @@ class Checker {
     } else {
       listed_once();
     }
-    if (messages_.empty() && !sah_) child_boxes();
-    if (messages_.empty() && sah_) report_if(5, clipped_boxes({tree_, corners_, cells_}));
+    if (messages_.empty() && strict_) report_if(5, clipped_boxes({tree_, corners_, cells_}));
+    if (messages_.empty() && !strict_) child_boxes();
     if (messages_.empty() && !strict_) planes_separate_centres();
     return std::move(messages_);
   }
@@ -331,16 +327,16 @@ class Checker {
     return true;
   }
 
-  // Cells of all leaves, from the scene box down. Every plane lies strictly inside its cell, which
-  // is all it takes for leaf cells to tile the scene box.
+  // Cells of all leaves, from the scene box down. Every plane lies inside its cell, above its lower
+  // side, which is all it takes for leaf cells to tile the scene box. On the upper side are planes
+  // before which nothing but touches it: of the scene box, or of a crowded leaf's cell.
   void cells() {
     struct Entry {
       Link link;
       ExactBox cell;
-      bool cut[3];  // the upper face is a plane, not the scene box's own
     };
     cells_.resize(tree_.leaf_count());
-    std::vector<Entry> stack{{tree_.root(), scene_, {false, false, false}}};
+    std::vector<Entry> stack{{tree_.root(), scene_}};
     while (!stack.empty()) {
       const Entry entry = stack.back();
       stack.pop_back();
@@ -352,9 +348,7 @@ class Checker {
       const auto plane = static_cast<double>(node.plane);
       const double lo = entry.cell.lo[node.axis];
       const double hi = entry.cell.hi[node.axis];
-      const bool inside =
-          sah_ ? lo <= plane && plane <= hi && lo < hi
-               : lo < plane && (plane < hi || (plane == hi && !entry.cut[node.axis]));
+      const bool inside = sah_ ? lo <= plane && plane <= hi && lo < hi : lo < plane && plane <= hi;
       if (!inside) {
         report(2, "the plane of node ", entry.link.index(), ", ", axis_name[node.axis], " = ",
                node.plane, ", is not inside its cell, ", lo, " to ", hi);
@@ -363,7 +357,6 @@ class Checker {
       Entry below = entry;
       below.link = node.child[0];
       below.cell.hi[node.axis] = plane;
-      below.cut[node.axis] = true;
       Entry above = entry;
       above.link = node.child[1];
       above.cell.lo[node.axis] = plane;
@@ -490,16 +483,7 @@ class Checker {
     const auto inside = climb([this](std::uint32_t leaf) {
       ExactBox box = empty_box();
       for (std::uint32_t i = tree_.leaf_offsets[leaf]; i < tree_.leaf_offsets[leaf + 1]; ++i) {
-        ExactBox part = box_of(*corners_[tree_.references[i]]);
-        if (strict_) {
-          for (std::size_t axis = 0; axis < 3; ++axis) {
-            part.lo[axis] = std::max(part.lo[axis], cells_[leaf].lo[axis]);
-            part.hi[axis] = std::min(part.hi[axis], cells_[leaf].hi[axis]);
-          }
-          // Listed within the slack only: nothing of it is here.
-          if (empty(part)) continue;
-        }
-        grow(box, part);
+        grow(box, box_of(*corners_[tree_.references[i]]));
       }
       return box;
     });
@@ -511,10 +495,7 @@ class Checker {
           const float hi = tree_.nodes[index].hi(which, axis);
           const double need_lo = box.lo[static_cast<std::size_t>(axis)];
           const double need_hi = box.hi[static_cast<std::size_t>(axis)];
-          const bool contains = (static_cast<double>(lo) <= need_lo || is_nearly(lo, need_lo)) &&
-                                (static_cast<double>(hi) >= need_hi || is_nearly(hi, need_hi));
-          const bool tight = strict_ || (is_nearly(lo, need_lo) && is_nearly(hi, need_hi));
-          if (contains && tight) continue;
+          if (is_nearly(lo, need_lo) && is_nearly(hi, need_hi)) continue;
           report(5, "child ", which, " of node ", index, " has its box from ", lo, " to ", hi,
                  " along ", axis_name[axis], ", its triangles reach from ", need_lo, " to ",
                  need_hi);

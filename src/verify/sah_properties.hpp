@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What holds of trees whose references are clipped triangles (Builder::sah, Builder::wu2011),
+// What holds of trees whose references are clipped triangles (strict ones, of every builder),
 // decided exactly. For check_tree(), which has found the tree well-formed; everything is in tree
 // space.
 #pragma once

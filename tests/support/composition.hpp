@@ -92,13 +92,32 @@ inline Composition compose(const Executor& executor, const TriangleView& triangl
   const std::uint64_t needed = stages::list_references(
       executor, uploaded, boxes, skeleton, out.lattice, options.references, leaf_offsets, none);
   Array<std::uint32_t> references(needed);
+  Array<Box> inside(options.references == References::all ? needed : 0);
   (void)stages::list_references(executor, uploaded, boxes, skeleton, out.lattice,
-                                options.references, leaf_offsets, references);
-  out.leaf_offsets = leaf_offsets.download();
-  out.references = references.download();
-  Array<Node> nodes(node_count);
-  stages::tight_boxes(executor, boxes, skeleton, options.references, leaf_offsets, references,
-                      nodes);
+                                options.references, leaf_offsets, references, inside);
+  if (options.references == References::once) {
+    Array<Node> nodes(node_count);
+    stages::tight_boxes(executor, boxes, skeleton, leaf_offsets, references, nodes);
+    out.leaf_offsets = leaf_offsets.download();
+    out.references = references.download();
+    out.nodes = nodes.download();
+    return out;
+  }
+  const auto split = [&](const stages::StrictArrays& arrays) {
+    return stages::split_crowded_leaves(executor, uploaded, boxes, trunk_keys, skeleton,
+                                        leaf_offsets, references, inside, options.leaf_size,
+                                        options.axis_order, arrays);
+  };
+  const stages::SplitLeaves strict = split({});
+  Array<Node> nodes(std::max<std::size_t>(strict.leaves, 1) - 1);
+  Array<std::uint32_t> strict_offsets(strict.leaves + std::size_t{1});
+  Array<std::uint32_t> strict_references(strict.references);
+  Array<Box> strict_inside(strict.references);
+  (void)split({nodes, strict_offsets, strict_references, strict_inside});
+  stages::tight_boxes(executor, strict.root, strict_offsets, strict_inside, nodes);
+  out.root = strict.root;
+  out.leaf_offsets = strict_offsets.download();
+  out.references = strict_references.download();
   out.nodes = nodes.download();
   return out;
 }

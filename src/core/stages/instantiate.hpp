@@ -53,8 +53,14 @@
                                                  std::span<const Box>, const Skeleton&,         \
                                                  const Lattice&, References,                    \
                                                  std::span<std::uint32_t>,                      \
-                                                 std::span<std::uint32_t>);                     \
+                                                 std::span<std::uint32_t>, std::span<Box>);     \
+  template ZKD_API SplitLeaves split_crowded_leaves(                                            \
+      const Executor&, const TriangleView&, std::span<const Box>, std::span<const TrunkKey>,    \
+      const Skeleton&, std::span<const std::uint32_t>, std::span<const std::uint32_t>,          \
+      std::span<const Box>, std::uint32_t, AxisOrder, const StrictArrays&);                     \
   template ZKD_API void tight_boxes(const Executor&, std::span<const Box>, const Skeleton&,     \
-                                    References, std::span<const std::uint32_t>,                 \
+                                    std::span<const std::uint32_t>,                             \
                                     std::span<const std::uint32_t>, std::span<Node>);           \
+  template ZKD_API void tight_boxes(const Executor&, Link, std::span<const std::uint32_t>,      \
+                                    std::span<const Box>, std::span<Node>);                     \
   }

@@ -11,6 +11,7 @@
 #include <zkd/stages.hpp>
 
 #include "core/check_input.hpp"
+#include "core/crowded_leaves.hpp"
 #include "core/morton.hpp"
 #include "core/references.hpp"
 #include "core/stages/backend.hpp"
@@ -26,7 +27,7 @@ std::uint64_t list_references(const Executor& executor, const TriangleView& tria
                               std::span<const Box> boxes, const Skeleton& skeleton,
                               const Lattice& lattice, References policy,
                               std::span<std::uint32_t> leaf_offsets,
-                              std::span<std::uint32_t> references) {
+                              std::span<std::uint32_t> references, std::span<Box> inside) {
   core::check_references(policy);
   core::check_view(triangles);
   core::check_length(boxes.size(), triangles.triangle_count, "boxes");
@@ -47,15 +48,15 @@ std::uint64_t list_references(const Executor& executor, const TriangleView& tria
   auto* counts = backend.keep(known);
 
   const std::uint32_t* offsets_found = skeleton.first.data();
-  const std::uint32_t* references_found = skeleton.ids.data();
+  core::StrictTree strict{};
   if (policy == References::all) {
-    auto* split_nodes = backend.template take_array<core::SplitNode>(trunks.bound);
+    core::StrictTree tree = core::strict_tree_of(backend, made, backend.nodes(), counts);
     auto* trunk_of = backend.template take_array<std::uint32_t>(valid.bound);
     const core::CellWalk walk{triangles,
                               skeleton.ids.data(),
                               trunk_of,
                               boxes.data(),
-                              split_nodes,
+                              tree.nodes,
                               skeleton.levels.data(),
                               made.parents_of_nodes,
                               made.parents_of_leaves,
@@ -64,25 +65,102 @@ std::uint64_t list_references(const Executor& executor, const TriangleView& tria
     core::ReferenceAll<Backend>{walk,
                                 skeleton.first.data(),
                                 core::Count{&counts->listed, valid.bound},
-                                core::Count{&counts->trunks, trunks.bound},
-                                core::Count{&counts->nodes, made.inner.bound},
                                 counts,
-                                backend.nodes(),
-                                split_nodes,
                                 trunk_of,
                                 backend.template take_array<std::uint32_t>(valid.bound)}
-        .run(backend, triangles);
-    offsets_found = backend.leaf_offsets();
-    references_found = backend.references();
+        .run(backend, triangles, tree);
+    offsets_found = tree.offsets;
+    strict = tree;
   }
   const std::uint64_t needed = backend.read(&counts->references_needed);
   const std::size_t fit = std::min<std::size_t>(references.size(), needed);
   backend.for_each(trunks, core::CopyTo<std::uint32_t>{offsets_found, leaf_offsets.data()});
-  backend.for_each(core::one, core::CloseOffsets{counts, leaf_offsets.data()});
-  backend.for_each(core::exactly(fit),
-                   core::CopyTo<std::uint32_t>{references_found, references.data()});
+  auto* const end = backend.keep(static_cast<std::uint32_t>(needed));
+  backend.for_each(core::one, core::CloseOffsets{&counts->trunks, end, leaf_offsets.data()});
+  const core::Count written = core::exactly(fit);
+  if (policy == References::all) {
+    backend.for_each(written,
+                     core::GatherTo<std::uint32_t>{strict.ids, strict.numbers, references.data()});
+    backend.for_each(core::exactly(std::min<std::size_t>(inside.size(), needed)),
+                     core::GatherTo<Box>{strict.inside, strict.numbers, inside.data()});
+  } else {
+    backend.for_each(written, core::CopyTo<std::uint32_t>{skeleton.ids.data(), references.data()});
+  }
   backend.wait();
   return needed;
+}
+
+template <class Executor>
+SplitLeaves split_crowded_leaves(const Executor& executor, const TriangleView& triangles,
+                                 std::span<const Box> boxes, std::span<const TrunkKey> trunk_keys,
+                                 const Skeleton& skeleton,
+                                 std::span<const std::uint32_t> leaf_offsets,
+                                 std::span<const std::uint32_t> references,
+                                 std::span<const Box> inside, std::uint32_t leaf_size,
+                                 AxisOrder order, const StrictArrays& out) {
+  core::check_leaf_size(leaf_size);
+  core::check_view(triangles);
+  core::check_length(boxes.size(), triangles.triangle_count, "boxes");
+  core::check_length(trunk_keys.size(), skeleton.first.size(), "trunk_keys");
+  core::check_length(leaf_offsets.size(), skeleton.first.size() + 1, "leaf_offsets");
+  core::check_length(inside.size(), references.size(), "inside");
+  using Backend = core::ExactBackendOf<Executor>;
+  Backend backend(executor);
+  core::check_each(backend, core::exactly(leaf_offsets.size()), "leaf_offsets",
+                   core::OffsetIsWrong{leaf_offsets.data(), references.size()});
+  core::check_each(backend, core::exactly(references.size()), "references",
+                   core::IsNotBelow{references.data(), boxes.size()});
+  const core::Count leaves = core::exactly(skeleton.first.size());
+  const core::Count listed = core::exactly(references.size());
+  backend.allocate_tree(leaves);
+  const core::MadeTree made = core::make_tree(backend, boxes, skeleton, backend.nodes());
+
+  core::BuildCounts known;
+  known.trunks = leaves.bound;
+  known.nodes = made.inner.bound;
+  known.first_references = listed.bound;
+  auto* counts = backend.keep(known);
+  core::StrictTree tree = core::strict_tree_of(backend, made, backend.nodes(), counts);
+  auto* leaf_of = backend.template take_array<std::uint32_t>(listed.bound);
+  backend.for_each(leaves, core::LabelTrunk{leaf_offsets.data(), &counts->trunks,
+                                            &counts->first_references, leaf_of});
+  tree.references = {&counts->first_references, listed.bound};
+  tree.offsets = leaf_offsets.data();
+  tree.leaf_of = leaf_of;
+  tree.numbers = backend.template take_array<std::uint32_t>(listed.bound);
+  backend.for_each(listed, core::Number{tree.numbers});
+  tree.ids = references.data();
+  tree.inside = inside.data();
+  core::CellWalk walk{};
+  walk.triangles = triangles;
+  walk.boxes = boxes.data();
+  walk.frame = made.frame;
+  auto* root = backend.keep(skeleton.root);
+  core::SplitCrowdedLeaves<Backend>{
+      walk,
+      trunk_keys.data(),
+      leaf_size,
+      order,
+      counts,
+      root,
+      core::most_reference_trunks(references.size(), skeleton.first.size())}
+      .run(backend, triangles, tree);
+
+  const std::uint32_t leaf_count = backend.read(&counts->trunks);
+  const std::uint32_t reference_count = backend.read(tree.references.actual);
+  const auto fitting = [](std::size_t room, std::uint64_t count) {
+    return core::exactly(std::min<std::size_t>(room, count));
+  };
+  backend.for_each(fitting(out.nodes.size(), core::nodes_between(leaf_count).bound),
+                   core::FinishNode{tree.nodes, out.nodes.data()});
+  backend.for_each(fitting(out.leaf_offsets.size(), std::uint64_t{leaf_count} + 1),
+                   core::CopyTo<std::uint32_t>{tree.offsets, out.leaf_offsets.data()});
+  backend.for_each(fitting(out.references.size(), reference_count),
+                   core::GatherTo<std::uint32_t>{tree.ids, tree.numbers, out.references.data()});
+  backend.for_each(fitting(out.inside.size(), reference_count),
+                   core::GatherTo<Box>{tree.inside, tree.numbers, out.inside.data()});
+  const Link new_root = backend.read(root);
+  return {new_root, leaf_count, reference_count};
 }
 
 }  // namespace zkd::stages

@@ -14,6 +14,7 @@
 
 #include "core/compress.hpp"
 #include "core/frame.hpp"
+#include "core/references.hpp"
 #include "core/stages/frame.hpp"
 #include "core/stages/input.hpp"
 #include "core/verbs.hpp"
@@ -42,6 +43,16 @@ struct BeginsWrongly {
   }
 };
 
+/// An offset below the one before it, or behind the last reference.
+struct OffsetIsWrong {
+  const std::uint32_t* offsets;
+  std::size_t references;
+  ZKD_HOST_DEVICE bool operator()(std::uint32_t t) const {
+    const bool ascending = t == 0 ? offsets[0] == 0 : offsets[t - 1] <= offsets[t];
+    return !ascending || offsets[t] > references;
+  }
+};
+
 /// Essential node j as a node: links, plane in tree space, and the way up for what is below it.
 struct MakeNode {
   const Link* children;
@@ -62,6 +73,17 @@ struct MakeNode {
       Parent* parents = child.is_leaf() ? parents_of_leaves : parents_of_nodes;
       parents[child.index()] = {index * 2 + side};
     }
+  }
+};
+
+/// What a walk needs of a node.
+struct MakeSplitNode {
+  const Node* nodes;
+  SplitNode* split_nodes;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t index) const {
+    const Node& node = nodes[index];
+    split_nodes[index] = {node.plane, node.axis, {node.child[0], node.child[1]}};
   }
 };
 
@@ -116,6 +138,21 @@ MadeTree make_tree(Backend& backend, std::span<const Box> boxes, const Skeleton&
                    MakeNode{skeleton.children.data(), skeleton.axes.data(), skeleton.planes.data(),
                             made.frame, made.parents_of_nodes, made.parents_of_leaves, nodes});
   return made;
+}
+
+/// The same for the two stages of strict trees; `nodes` as above.
+template <class Backend>
+StrictTree strict_tree_of(Backend& backend, const MadeTree& made, const Node* nodes,
+                          const BuildCounts* counts) {
+  StrictTree tree{};
+  auto* split_nodes = backend.template take_array<SplitNode>(made.inner.bound);
+  backend.for_each(made.inner, MakeSplitNode{nodes, split_nodes});
+  tree.leaves = {&counts->trunks, made.leaves.bound};
+  tree.inner = {&counts->nodes, made.inner.bound};
+  tree.nodes = split_nodes;
+  tree.parents_of_nodes = made.parents_of_nodes;
+  tree.parents_of_leaves = made.parents_of_leaves;
+  return tree;
 }
 
 }  // namespace zkd::core

@@ -84,11 +84,11 @@ class Build {
     Block block =
         lay_out_block(memory_, [&](core::Arena& arena) { take_part(arena, root.count, root); });
     const double scale = input_.state->frame.scale;
-    if (root.count > 0) root.cell = in_tree_space(input_.state->report.bounds, scale);
+    if (root.count > 0) root.cell = core::in_tree_space(input_.state->report.bounds, scale);
     threads_.share(root.count, grain, [&root, scale, input = input_](Range range) {
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
         const std::uint32_t id = input.ids[i];
-        root.references[i] = {in_tree_space(input.boxes[id], scale), id};
+        root.references[i] = {core::in_tree_space(input.boxes[id], scale), id};
       }
     });
     return block;
