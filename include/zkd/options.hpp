@@ -109,7 +109,8 @@ struct BuildOptions {
   std::uint64_t reference_capacity = 0;
 
   /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
-  /// 1024. Of 1, 2, 4 and 8, 4 was within 3 % of the best for build plus trace on Bunny and the
+  /// 1024. With `all` a leaf that lists more than four times as many is split again, by what lies in
+  /// its cell, into trunks of twice as many. Of 1, 2, 4 and 8, 4 was within 3 % of the best for build plus trace on Bunny and the
   /// best on Sibenik. Time of the trunk stage grows with it.
   std::uint32_t leaf_size = 4;
 
