@@ -123,13 +123,15 @@ struct BuildOptions {
 
   /// References that a CUDA build of `all` makes room for, at most max_count: there memory is taken
   /// before anything is known of the scene. analyse() (zkd/cuda/build.hpp) finds it. Too little is
-  /// ErrorCode::reference_capacity, which says how many are needed; more changes nothing but the
-  /// memory. On the CPU, and with `once`, it is not looked at.
+  /// ErrorCode::reference_capacity, which says how many are needed (with too little even before
+  /// crowded leaves are split, how many for that); more changes nothing but the memory. On the CPU,
+  /// and with `once`, it is not looked at.
   std::uint64_t reference_capacity = 0;
 
   /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
-  /// 1024. Of 1, 2, 4 and 8, 4 was within 3 % of the best for build plus trace on Bunny and the
-  /// best on Sibenik. Time of the trunk stage grows with it.
+  /// 1024. With `all` a leaf that lists more than four times as many is split again, by what lies
+  /// in its cell, into trunks of twice as many. Of 1, 2, 4 and 8, 4 was within 3 % of the best for
+  /// build plus trace on Bunny and the best on Sibenik. Time of the trunk stage grows with it.
   std::uint32_t leaf_size = 4;
 
   /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. With 32
