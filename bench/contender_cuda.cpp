@@ -100,12 +100,14 @@ class CudaContender final : public ZkdContender {
       options_ = analyse(executor(), triangles(), options_);
       gpu.analyse_ms = watch.ms();
     }
-    const MemoryRequirement asked =
-        memory_requirement(executor(), triangles().triangle_count, options_);
-    result.allocated.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;
+    if (is_planned()) {
+      const MemoryRequirement asked =
+          memory_requirement(executor(), triangles().triangle_count, options_);
+      result.allocated.asked_beforehand = asked.tree_bytes + asked.workspace_bytes;
+      workspace_.reserve(asked.workspace_bytes);
+    }
     measure_memory(result.allocated);
 
-    workspace_.reserve(asked.workspace_bytes);
     tree_ = zkd::build(executor_with_workspace(), triangles(), options_);
     tree_.check();
 
@@ -123,7 +125,8 @@ class CudaContender final : public ZkdContender {
   }
 
   // rebuild() with the caller's workspace, from an idle stream. One goes ahead unseen: between
-  // repetitions the device does nothing for a while, and clocks and caches need a moment.
+  // repetitions the device does nothing for a while, and clocks and caches need a moment. A builder
+  // that makes room as it goes builds anew, from the default pool, and waits on the way.
   double build() override {
     host_tree_ = Tree();
     rebuild_into(executor_with_workspace());
@@ -195,7 +198,7 @@ class CudaContender final : public ZkdContender {
 
   void measure_more(Result& result, unsigned repeat) override {
     Gpu& gpu = *result.gpu;
-    measure_graph(gpu, result.tree_hash, repeat);
+    if (is_planned()) measure_graph(gpu, result.tree_hash, repeat);
     measure_calls(gpu, repeat);
     measure_copies(gpu, repeat);
   }
@@ -214,7 +217,15 @@ class CudaContender final : public ZkdContender {
   }
   [[nodiscard]] TriangleView triangles() const { return mesh_->device(); }
 
-  void rebuild_into(const cuda::Executor& with) { rebuild(with, tree_, triangles()); }
+  // Whether all memory is known beforehand, so that a tree can be built again in its own.
+  [[nodiscard]] bool is_planned() const { return options_.builder == Builder::morton; }
+
+  void rebuild_into(const cuda::Executor& with) {
+    if (is_planned())
+      rebuild(with, tree_, triangles());
+    else
+      tree_ = zkd::build(with, triangles(), options_);
+  }
 
   void measure_memory(AllocatedBytes& bytes) const {
     CountingDeviceMemory memory;

@@ -51,7 +51,8 @@ class CpuContender final : public ZkdContender {
   }
 
   // Bytes, in a build whose memory is counted. `once` can be asked for beforehand; for `all` the
-  // question is put with the number of references that it turned out to have; `sah` cannot tell.
+  // question is put with the number of references that it turned out to have; the others cannot
+  // tell.
   void describe(Result& result) override {
     CountingResource memory;
     cpu::Executor counted = executor_;

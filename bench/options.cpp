@@ -167,11 +167,11 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   number(build, "--reference-capacity", reference_capacity,
          "On CUDA, references that `all` has room for; 0: as many as it needs", 0,
          std::int64_t{max_count});
-  text(build, "--sah-areas", sah_areas, "For sah, areas of: " + names_of(all_sah_areas, ", "),
-       "WHAT");
-  fraction("--sah-visit-cost", visit_cost, "For sah, the cost of a node visit");
-  fraction("--sah-test-cost", test_cost, "For sah, the cost of a triangle test");
-  fraction("--sah-empty-bonus", empty_bonus, "For sah over cells, what cutting off space saves");
+  text(build, "--sah-areas", sah_areas,
+       "For sah and wu2011, areas of: " + names_of(all_sah_areas, ", "), "WHAT");
+  fraction("--sah-visit-cost", visit_cost, "For sah and wu2011, the cost of a node visit");
+  fraction("--sah-test-cost", test_cost, "For sah and wu2011, the cost of a triangle test");
+  fraction("--sah-empty-bonus", empty_bonus, "For both over cells, what cutting off space saves");
   text(build, "--measure-quality", measure_quality,
        "Depth and SAH cost, in a build of its own: on, off", "ON|OFF");
   text(build, "--instructions", instructions, names_of(all_instructions, ", "), "SET");
@@ -236,8 +236,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   for (const Builder one_builder : builders) {
     for (const Quality one_quality : qualities) {
       for (const References one_policy : policies) {
-        // sah knows one policy only.
-        if (one_builder == Builder::sah && one_policy != policies.front()) continue;
+        // The others know one policy only.
+        if (one_builder != Builder::morton && one_policy != policies.front()) continue;
         for (const Layout one_layout : layouts) {
           BuildOptions setting = base;
           setting.builder = one_builder;

@@ -186,12 +186,11 @@ TEST(ApiError, EnumeratorsThatDoNotExist) {
 
 TEST(ApiError, OptionsOfLaterVersions) {
   const Strip strip(10);
-  std::vector<BuildOptions> later(4);
+  std::vector<BuildOptions> later(3);
   later[0].references = References::budget;
   later[1].references = References::automatic;
-  later[2].builder = Builder::wu2011;
-  later[3].quality = Quality::balanced;
-  const char* words[] = {"budget", "auto", "wu2011", "balanced"};
+  later[2].quality = Quality::balanced;
+  const char* words[] = {"budget", "auto", "balanced"};
   for (std::size_t i = 0; i < later.size(); ++i) {
     const Caught error = build_error(strip.view(), later[i]);
     ASSERT_TRUE(error.thrown) << words[i];

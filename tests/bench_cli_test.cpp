@@ -110,7 +110,6 @@ TEST_F(BenchCli, BadInputIsOneLineThatNamesTheFile) {
 
 TEST_F(BenchCli, WhatThisVersionDoesNotBuildIsUsage) {
   expect_error("tetra.obj --references budget", 2, "budget");
-  expect_error("tetra.obj --builder wu2011", 2, "wu2011");
   expect_error("tetra.obj --quality balanced", 2, "balanced");
 }
 
@@ -120,6 +119,15 @@ TEST_F(BenchCli, QualityHighIsTheSahBuilder) {
   EXPECT_EQ(high["options"]["builder"], "sah");
   EXPECT_EQ(high["options"]["quality"], "high");
   EXPECT_EQ(high["tree"]["hash"], sah["tree"]["hash"]);
+}
+
+TEST_F(BenchCli, Wu2011MakesTheTreeOfSah) {
+  const Json results = run_json("tetra.obj --builder sah,wu2011" + std::string(quick))["results"];
+  ASSERT_EQ(results.size(), 2u);
+  EXPECT_EQ(results[1]["options"]["builder"], "wu2011");
+  EXPECT_EQ(results[1]["options"]["references"], "all");
+  EXPECT_EQ(results[1]["tree"]["hash"], results[0]["tree"]["hash"]);
+  EXPECT_EQ(results[1]["tree"]["sah"], results[0]["tree"]["sah"]);
 }
 
 // What --backend cuda says here, if no CUDA device answers.

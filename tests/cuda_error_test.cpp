@@ -198,7 +198,7 @@ TEST(CudaError, OptionsAndViewsAsOnTheCpu) {
   wrong[2].code_bits = 65;
   wrong[3].references = References::budget;
   wrong[4].references = static_cast<References>(99);
-  wrong[5].builder = Builder::sah;
+  wrong[5].quality = Quality::balanced;
   wrong[6].reference_capacity = max_count + 1;
   wrong[7].budget = nan_value;
   Machine machine;
@@ -323,6 +323,47 @@ TEST(CudaError, RebuildsOnlyWhatWasBuilt) {
   EXPECT_EQ(tree_hash(copied.to_host().view()), tree_hash(on_cpu.view()));
 }
 
+// ---- Level by level
+// ------------------------------------------------------------------------------
+
+// It waits, so it throws at once.
+TEST(CudaError, Wu2011ThrowsWhatTheCpuThrows) {
+  scene::Mesh mesh = scene::soup(300, 105);
+  mesh.positions[100].x = nan_value;
+  const BuildOptions options{.builder = Builder::wu2011};
+  const auto expect_at_once = [&] {
+    const Caught want = cpu_error(mesh.view(), options);
+    ASSERT_TRUE(want.thrown);
+    Machine machine;
+    const Triangles uploaded(machine, mesh);
+    const std::size_t live = machine.memory.live_blocks();
+    EXPECT_EQ(caught([&] { (void)build(machine.executor(), uploaded.view(), options); }), want);
+    EXPECT_EQ(caught([&] { (void)build(machine.executor(), mesh.view(), options); }), want);
+    machine.stream.synchronize();
+    EXPECT_EQ(machine.memory.live_blocks(), live);
+  };
+  expect_at_once();
+  mesh.faces[7].y = 900;
+  expect_at_once();
+}
+
+TEST(CudaError, Wu2011MakesRoomAsItGoes) {
+  const scene::Mesh mesh = scene::soup(300, 106);
+  BuildOptions options{.builder = Builder::wu2011, .references = References::all};
+  Machine machine;
+  EXPECT_EQ(caught([&] { (void)memory_requirement(machine.executor(), 300, options); }).code,
+            ErrorCode::unsupported_option);
+  const BuildOptions found = analyse(machine.executor(), mesh.view(), options);
+  EXPECT_EQ(found.builder, Builder::wu2011);
+  EXPECT_EQ(found.reference_capacity, 0u);
+  simulated::Tree tree = build(machine.executor(), mesh.view(), found);
+  const std::string hash = tree_hash(build(mesh.view(), {.builder = Builder::sah}).view());
+  EXPECT_EQ(tree_hash(tree.to_host().view()), hash);
+  const Caught again = caught([&] { rebuild(machine.executor(), tree, mesh.view()); });
+  EXPECT_EQ(again.code, ErrorCode::unsupported_option) << again.message;
+  EXPECT_EQ(tree_hash(tree.to_host().view()), hash) << "left as it was";
+}
+
 // ---- Memory refused -----------------------------------------------------------------------------
 
 TEST(CudaError, MemoryRefused) {
@@ -336,6 +377,7 @@ TEST(CudaError, MemoryRefused) {
       [&] { (void)build(machine.executor(), triangles.view()); },
       [&] { rebuild(machine.executor(), tree, triangles.view()); },
       [&] { (void)analyse(machine.executor(), mesh.view(), {.references = References::all}); },
+      [&] { (void)build(machine.executor(), mesh.view(), {.builder = Builder::wu2011}); },
       [&] { (void)simulated::to_device(machine.executor(), on_cpu, mesh.view()); }};
   for (const auto& call : calls) {
     machine.stream.synchronize();

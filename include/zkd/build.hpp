@@ -30,7 +30,8 @@ namespace zkd {
 /// number of digits); with `all` O((n + references) * depth). Builder::sah (Wald, Havran: On
 /// building fast kd-Trees for Ray Tracing, and on doing that in O(N log N), RT 2006): O(n log n) as
 /// long as few triangles lie across each plane, else O((n + references) * depth). Its memory is not
-/// bounded beforehand; it takes at most 2^30 - 1 valid triangles (too_many_triangles).
+/// bounded beforehand; it takes at most 2^30 - 1 valid triangles (too_many_triangles). wu2011: as
+/// much, and a sort of the events that clipping makes on each level; 2^31 / 6 references a level.
 ///
 /// Throws Error: index_out_of_range, non_finite_vertex, too_many_triangles, too_many_references,
 /// invalid_view, invalid_option, unsupported_option, backend_unavailable, out_of_memory; and on
@@ -51,10 +52,11 @@ struct MemoryRequirement {
 /// What build() allocates at most from its memory resource for `triangle_count` triangles, whatever
 /// the scene: a resource that holds tree_bytes + workspace_bytes is never exhausted. Scenes without
 /// crowded trunks take less. For References::all the number of references is not known beforehand:
-/// pass a bound (or a guess) in `reference_count`. For Builder::sah nothing is known beforehand.
+/// pass a bound (or a guess) in `reference_count`. For other builders than
+/// morton nothing is known beforehand.
 /// O(1).
 ///
-/// Throws Error invalid_option, unsupported_option (Builder::sah too), too_many_triangles.
+/// Throws Error invalid_option, unsupported_option (other builders too), too_many_triangles.
 [[nodiscard]] ZKD_API MemoryRequirement memory_requirement(const cpu::Executor& executor,
                                                            std::uint64_t triangle_count,
                                                            const BuildOptions& options = {},

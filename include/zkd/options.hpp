@@ -20,8 +20,9 @@ enum class Backend {
 enum class References {
   once,    ///< in the trunk of its centre only; boxes of siblings may overlap. Fastest to build
   budget,  ///< some triangles split, within BuildOptions::budget (not in this version)
-  all,     ///< in every leaf cell it touches: a strict kd-tree with disjoint cells. (Builder::sah:
-           ///< that a piece of it with an area lies in; if it lies in a plane, on one side)
+  all,     ///< in every leaf cell it touches: a strict kd-tree with disjoint cells. (Builder::sah
+           ///< and wu2011: that a piece of it with an area lies in; if it lies in a plane, on one
+           ///< side)
   automatic,  ///< chosen from the scene (not in this version)
 };
 
@@ -29,7 +30,7 @@ enum class References {
 enum class Builder {
   morton,  ///< all nodes at once from Morton codes (Li, Wang, Deng, I3D 2014)
   sah,     ///< exact surface-area heuristic (Wald, Havran 2006; see SahOptions). CPU only
-  wu2011,  ///< Wu, Zhao, Liu 2011 (not in this version)
+  wu2011,  ///< the tree of `sah`, level by level on any backend (Wu, Zhao, Liu, HPG 2011)
 };
 
 /// How much time the Morton builder may spend on a better tree.
@@ -58,8 +59,9 @@ enum class AxisOrder {
   cyclic,     ///< x, y, z in turn, as in the poster
 };
 
-/// What Builder::sah weighs: a split costs `visit_cost` and the expected triangle tests on its two
-/// sides, a leaf its triangle tests (MacDonald and Booth 1990), and the cheapest is taken.
+/// What Builder::sah and wu2011 weigh: a split costs `visit_cost` and the expected triangle tests
+/// on its two sides, a leaf its triangle tests (MacDonald and Booth 1990), and the cheapest is
+/// taken.
 struct SahOptions {
   /// Of a ray that visits an inner node, in any unit; 1/1024 to 1024. With both costs 1 the builder
   /// minimises what Statistics::sah_cost measures.
@@ -89,8 +91,17 @@ struct BuildOptions {
   /// (`leaf_size` is not looked at), and has no use for codes: `code_bits`, `axis_order`,
   /// `recode_crowded` and `reference_capacity` are not looked at either. In a device build it is
   /// ErrorCode::unsupported_option; without an executor, Backend::automatic takes the CPU for it.
+  ///
+  /// `wu2011` makes the very tree of `sah`, byte for byte, on every backend: Wu, Zhao, Liu, SAH
+  /// KD-Tree Construction on GPU (HPG 2011), breadth first, all nodes of a level at once. It is
+  /// there to measure the Morton builder by, and for SAH trees on a device; on the CPU `sah` is
+  /// quicker. The same options count. A level may have 2^31 / 6 references at most
+  /// (too_many_references). On a device it waits twice a level for a few counts, by which it takes
+  /// memory for the next: build() throws what goes wrong at once, takes everything from
+  /// Executor::memory and nothing from Executor::workspace, and cannot be captured by a CUDA graph;
+  /// rebuild() and memory_requirement() are ErrorCode::unsupported_option.
   Builder builder = Builder::morton;
-  SahOptions sah{};  ///< for Builder::sah
+  SahOptions sah{};  ///< for Builder::sah and wu2011
 
   Quality quality = Quality::fast;
 

@@ -11,8 +11,8 @@
 namespace zkd {
 
 /// The stages of a build, in the order of the poster. Validation is timed with the lattice.
-/// Builder::sah has four: validate, sort (of events), split_planes (with references and boxes) and
-/// references (from the parts of all threads to one tree).
+/// Builder::sah and wu2011 have four: validate, sort (of events), split_planes (with references and
+/// boxes) and references (from the parts of all threads to one tree).
 enum class Stage : std::uint8_t {
   validate,          ///< checks, triangle boxes, scene box, lattice
   encode,            ///< Morton codes

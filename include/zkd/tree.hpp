@@ -150,7 +150,8 @@ class ZKD_API Tree {
             view_.references + view_.leaf_offsets[leaf + 1]};
   }
 
-  /// The lattice of the first round of codes; of no bits with Builder::sah.
+  /// The lattice of the first round of codes; of no bits with other builders than
+  /// morton.
   [[nodiscard]] const Lattice& lattice() const noexcept { return lattice_; }
 
   /// The options it was built with, every `automatic` replaced by what was chosen.

@@ -41,7 +41,7 @@ struct LeafSizeBins {
 struct TreeStatistics {
   std::uint64_t nodes = 0;  ///< inner nodes
   std::uint64_t leaves = 0;
-  std::uint64_t empty_leaves = 0;  ///< leaves that list nothing (Builder::sah has them)
+  std::uint64_t empty_leaves = 0;  ///< leaves that list nothing (Builder::sah and wu2011 have them)
   std::uint64_t references = 0;
   std::uint64_t largest_leaf = 0;  ///< references
   double mean_leaf = 0.0;          ///< references in a leaf that lists something

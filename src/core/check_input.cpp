@@ -65,7 +65,6 @@ void check_ranges(const BuildOptions& options) {
 
 /// What this version does not have.
 void check_supported(const BuildOptions& options) {
-  if (options.builder == Builder::wu2011) unsupported("builder", to_string(options.builder));
   if (builder_for(options) != Builder::morton) return;
   if (options.quality != Quality::fast) unsupported("quality", to_string(options.quality));
   if (options.references == References::budget || options.references == References::automatic)
@@ -119,6 +118,14 @@ void check_options(const BuildOptions& options) {
     fail(ErrorCode::unsupported_option, 0,
          "builder sah (and quality high) is only there for builds on the CPU");
   check_supported(options);
+}
+
+void check_predictable(const BuildOptions& options) {
+  const Builder builder = builder_for(options);
+  if (builder != Builder::morton)
+    fail(ErrorCode::unsupported_option, 0,
+         std::string("what builder ") + to_string(builder) +
+             " takes is not known beforehand: memory_requirement is for others");
 }
 
 void check_cpu_options(const BuildOptions& options) {

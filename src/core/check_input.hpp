@@ -23,11 +23,15 @@ ZKD_API void check_count(std::uint64_t triangle_count);
                                                                                 : options.builder;
 }
 
-/// For the Morton builder. Throws Error invalid_option or unsupported_option.
+/// For the builders that run over the verbs, on any backend. Throws Error invalid_option or
+/// unsupported_option.
 ZKD_API void check_options(const BuildOptions& options);
 
 /// For every builder that the CPU has. Throws likewise.
 void check_cpu_options(const BuildOptions& options);
+
+/// For those whose memory is known beforehand. Throws Error unsupported_option.
+ZKD_API void check_predictable(const BuildOptions& options);
 
 /// Throws Error invalid_option where `value` is no enumerator of an enumeration that ends in
 /// `last`.

@@ -38,6 +38,10 @@ inline BuildOptions used_options(const BuildState& state, const BuildOptions& op
                                  Backend backend) {
   BuildOptions used = options;
   used.backend = backend;
+  if (options.builder != Builder::morton) {
+    used.references = References::all;
+    return used;
+  }
   used.code_bits = choose_code_bits(options.code_bits, state.report.valid);
   return used;
 }

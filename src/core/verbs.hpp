@@ -13,6 +13,12 @@
 //   reduce(count, &out, f)             out = T{}; f(i, out) for all i, in any grouping (T::combine)
 //   select(count, f, out, &total)      the i for which f(i), in order
 //   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
+//   scan<T>(count, f)                  sum = T{}; for each i in order: f(i, sum), then f.take(i,
+//   sum),
+//                                      in any grouping (T::combine, of what follows). f.take(i) may
+//                                      write to what f(i) reads and no other f(k) does. Segments
+//                                      are in T, which a first element empties; f.segment_begin(i):
+//                                      the first element that the sum at i depends on
 //   segmented_reduce(segments, offsets, elements, out, f)   out[s] = T{}; f(s, i, out[s])
 //   radix_sort(buffers, count, bits)   stable; says in which of the buffers the result is
 //   climb(leaves, arrivals, f)         f.begin(leaf), then f.rise(node) for each node whose second
@@ -22,6 +28,8 @@
 //   raise(status, triangles)           throws what the status says, if the host can look now
 //   reference_capacity()               how many references a tree may have
 //   take(layout, counts...)            arrays until the build ends
+//   hold(bytes)                        a block of its own (Held: data(), bytes()), until its owner
+//                                      dies. Only where builds wait
 //   keep(value)                        a copy in the backend's memory until the build ends, for
 //                                      functors to point to
 //   read(pointer)                      what it points to, when all that was enqueued is done:
@@ -29,6 +37,7 @@
 //                                      Builds do not, single stages do (core/stages)
 //   allocate_tree, allocate_references the arrays of the tree, from then on at header(), nodes(),
 //                                      leaf_offsets(), references()
+//   allocate_tree_exactly(leaves, references)     both, where the host knows
 //
 // A functor is copied for every range of elements that one thread works on. If it has a member
 // load(), that is called first: there the copy reads numbers that earlier stages left in the

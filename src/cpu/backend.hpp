@@ -122,6 +122,37 @@ class Backend {
       });
   }
 
+  /// Every thread first sums what the sum at its last element depends on, for those after it.
+  template <class T, class Functor>
+  void scan(core::Count count, Functor f) {
+    const std::uint32_t n = size(count);
+    const int team = threads_.team(n);
+    Scratch<T> sums(*this, static_cast<std::size_t>(team));
+    if (team > 1)
+      threads_.divide(n, team, [f, sums = sums.data](Range range, int thread) {
+        Functor g = loaded(f);
+        T sum{};
+        for (std::uint32_t i = std::max(range.begin, g.segment_begin(range.end - 1)); i < range.end;
+             ++i)
+          g(i, sum);
+        sums[thread] = sum;
+      });
+    T before{};
+    for (int thread = 0; thread < team; ++thread) {
+      const T sum = before;
+      if (team > 1) before.combine(sums.data[thread]);
+      sums.data[thread] = sum;
+    }
+    threads_.divide(n, team, [f, sums = sums.data](Range range, int thread) {
+      Functor g = loaded(f);
+      T sum = sums[thread];
+      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        g(i, sum);
+        g.take(i, sum);
+      }
+    });
+  }
+
   /// Elements are divided evenly, whatever the segments: a thread that begins inside one leaves
   /// what it found there for the thread where the segment begins.
   template <class T, class Functor>
@@ -218,6 +249,33 @@ class Backend {
     blocks_[blocks_used_++] = lay_out(layout, counts...);
   }
 
+  /// A block that is counted as long as it lives.
+  class Held {
+   public:
+    Held() = default;
+    Held(Backend& backend, std::size_t bytes) : backend_(&backend), block_(backend.memory_, bytes) {
+      backend.held_ += bytes;
+      backend.count_held();
+    }
+    Held(Held&& other) noexcept
+        : backend_(std::exchange(other.backend_, nullptr)), block_(std::move(other.block_)) {}
+    Held& operator=(Held&& other) noexcept {
+      std::swap(backend_, other.backend_);
+      std::swap(block_, other.block_);
+      return *this;
+    }
+    ~Held() {
+      if (backend_ != nullptr) backend_->held_ -= block_.bytes();
+    }
+    [[nodiscard]] void* data() const noexcept { return block_.data(); }
+    [[nodiscard]] std::size_t bytes() const noexcept { return block_.bytes(); }
+
+   private:
+    Backend* backend_ = nullptr;
+    core::HostBlock block_;
+  };
+  Held hold(std::size_t bytes) { return Held(*this, bytes); }
+
   /// A copy until the build ends.
   template <class T>
   T* keep(const T& value) {
@@ -270,6 +328,11 @@ class Backend {
     references_ = static_cast<std::uint32_t*>(reference_block_.data());
   }
 
+  void allocate_tree_exactly(std::uint32_t leaves, std::uint32_t references) {
+    allocate_tree(core::Count{nullptr, leaves});
+    allocate_references(core::Count{nullptr, references});
+  }
+
   [[nodiscard]] TreeHeader* header() const { return arrays_.header; }
   [[nodiscard]] Node* nodes() const { return arrays_.nodes; }
   [[nodiscard]] std::uint32_t* leaf_offsets() const { return arrays_.leaf_offsets; }
@@ -318,10 +381,13 @@ class Backend {
     core::HostBlock block(memory_, core::bytes_of(layout, counts...));
     core::Arena arena(block.data());
     layout.lay_out(arena, counts...);
-    std::size_t held = block.bytes();
+    count_held(block.bytes());
+    return block;
+  }
+  void count_held(std::size_t more = 0) {
+    std::size_t held = held_ + more;
     for (int i = 0; i < blocks_used_; ++i) held += blocks_[i].bytes();
     most_held_ = std::max(most_held_, held);
-    return block;
   }
 
   /// Goes up from a finished child until it is the first to arrive.
@@ -342,6 +408,7 @@ class Backend {
   std::pmr::memory_resource* memory_;
   core::HostBlock blocks_[max_blocks];
   int blocks_used_ = 0;
+  std::size_t held_ = 0;  // in blocks of others
   std::size_t most_held_ = 0;
   core::HostBlock tree_block_;
   core::HostBlock reference_block_;

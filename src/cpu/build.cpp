@@ -12,15 +12,16 @@
 #include "core/outcome.hpp"
 #include "core/pipeline.hpp"
 #include "core/quality.hpp"
+#include "core/wu2011/builder.hpp"
 #include "cpu/backend.hpp"
 #include "cpu/sah/build.hpp"
 
 namespace zkd {
 namespace {
 
-template <class Code>
+template <class Pipeline>
 Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const BuildOptions& options) {
-  core::MortonPipeline<Code, cpu::Backend> pipeline(backend, triangles, options);
+  Pipeline pipeline(backend, triangles, options);
   pipeline.run();
   backend.finish();
   const core::BuildState& state = *pipeline.state();
@@ -35,12 +36,17 @@ Tree build_with(cpu::Backend& backend, const TriangleView& triangles, const Buil
                                  statistics, backend.tree_block(), backend.reference_block());
 }
 
-Tree build_morton(const cpu::Executor& executor, const TriangleView& triangles,
-                  const BuildOptions& options) {
+/// Over the verbs.
+Tree build_by_passes(const cpu::Executor& executor, const TriangleView& triangles,
+                     const BuildOptions& options) {
   cpu::Backend backend(executor);
+  if (options.builder == Builder::wu2011)
+    return build_with<core::wu2011::Builder<cpu::Backend>>(backend, triangles, options);
   return core::needs_wide_codes(options, triangles.triangle_count)
-             ? build_with<std::uint64_t>(backend, triangles, options)
-             : build_with<std::uint32_t>(backend, triangles, options);
+             ? build_with<core::MortonPipeline<std::uint64_t, cpu::Backend>>(backend, triangles,
+                                                                             options)
+             : build_with<core::MortonPipeline<std::uint32_t, cpu::Backend>>(backend, triangles,
+                                                                             options);
 }
 
 }  // namespace
@@ -54,7 +60,7 @@ Tree build(const cpu::Executor& executor, const TriangleView& triangles,
   BuildOptions used = options;
   used.builder = core::builder_for(options);
   Tree tree = used.builder == Builder::sah ? cpu::sah::build(executor, triangles, used)
-                                           : build_morton(executor, triangles, used);
+                                           : build_by_passes(executor, triangles, used);
   Statistics& statistics = TreeAssembler::statistics(tree);
   statistics.total_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -82,9 +88,7 @@ MemoryRequirement memory_requirement(const cpu::Executor& executor, std::uint64_
                                      const BuildOptions& options, std::uint64_t reference_count) {
   cpu::check_executor(executor);
   core::check_cpu_options(options);
-  if (core::builder_for(options) == Builder::sah)
-    throw Error(ErrorCode::unsupported_option, 0,
-                "what builder sah takes is not known beforehand: memory_requirement is for others");
+  core::check_predictable(options);
   core::check_count(triangle_count);
   return cpu::Backend::requirement(
       executor, triangle_count, options, core::needs_wide_codes(options, triangle_count),

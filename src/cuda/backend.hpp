@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The verbs of core/verbs.hpp for a device that works by itself: what is enqueued, in which order,
-// in which memory. Host code, and nothing in it waits for the device.
+// in which memory. Host code, and nothing in it waits for the device but read().
 //
 // How a pass runs is the business of a Device (cuda/device.cuh; the tests have one that runs on the
 // host). Every call enqueues on its stream:
 //
 //   for_each(count, f), climb(leaves, arrivals, f)     as the verbs
-//   reduce, select, exclusive_scan, segmented_reduce, radix_sort
+//   reduce, select, exclusive_scan, scan, segmented_reduce, radix_sort
 //       likewise, with two arguments in front: scratch memory and its size. Without memory (null)
 //       nothing is enqueued, and the size becomes what would be needed.
 //   stage(next)                                        for clocks and profilers
@@ -40,6 +40,19 @@ template <class T>
 struct Array {
   T* data = nullptr;
   void lay_out(core::Arena& arena, std::size_t count) { data = arena.take<T>(count); }
+};
+
+/// A tree whose size is known.
+struct ExactTree {
+  core::BuildState* record;
+  core::TreeArrays arrays;
+  Array<std::uint32_t> references;
+
+  void lay_out(core::Arena& arena, std::size_t leaves, std::size_t reference_count) {
+    record = arena.take<core::BuildState>(1);
+    arrays.lay_out(arena, leaves);
+    references.lay_out(arena, reference_count);
+  }
 };
 
 /// Takes a value along to the device.
@@ -91,6 +104,14 @@ class Backend {
   }
 
   template <class T, class Functor>
+  void scan(core::Count count, Functor f) {
+    if (count.bound == 0) return;
+    enqueue_with_scratch([&](void* scratch, std::size_t& bytes) {
+      device_.template scan<T>(scratch, bytes, count, f);
+    });
+  }
+
+  template <class T, class Functor>
   void segmented_reduce(core::Count segments, const std::uint32_t* offsets, core::Count elements,
                         T* out, Functor f) {
     if (elements.bound == 0) return;
@@ -130,6 +151,17 @@ class Backend {
     memory_.take_for_tree(references_, capacity_.references);
   }
 
+  void allocate_tree_exactly(std::uint32_t leaves, std::uint32_t references) {
+    ExactTree tree{};
+    memory_.take_for_tree(tree, leaves, references);
+    record_ = tree.record;
+    arrays_ = tree.arrays;
+    references_ = tree.references;
+  }
+  auto hold(std::size_t bytes) { return memory_.hold(bytes); }
+
+  /// After allocate_tree_exactly: room for what the build found.
+  [[nodiscard]] core::BuildState* record() const { return record_; }
   [[nodiscard]] TreeHeader* header() const { return arrays_.header; }
   [[nodiscard]] Node* nodes() const { return arrays_.nodes; }
   [[nodiscard]] std::uint32_t* leaf_offsets() const { return arrays_.leaf_offsets; }
@@ -182,6 +214,7 @@ class Backend {
   Device& device_;
   Memory& memory_;
   Capacity capacity_;
+  core::BuildState* record_ = nullptr;
   core::TreeArrays arrays_{};
   Array<std::uint32_t> references_{};
   std::uint32_t passes_ = 0;

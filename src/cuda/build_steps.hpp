@@ -23,6 +23,7 @@
 #include "core/check_input.hpp"
 #include "core/outcome.hpp"
 #include "core/pipeline.hpp"
+#include "core/wu2011/builder.hpp"
 #include "cuda/backend.hpp"
 #include "cuda/memory.hpp"
 
@@ -180,7 +181,8 @@ class Workspace {
 };
 
 inline void check_reference_capacity(const BuildOptions& options) {
-  if (options.references == References::all && options.reference_capacity == 0)
+  if (options.builder == Builder::morton && options.references == References::all &&
+      options.reference_capacity == 0)
     throw Error(ErrorCode::invalid_option, 0,
                 "References::all on CUDA needs BuildOptions::reference_capacity; analyse() finds "
                 "it");
@@ -190,12 +192,44 @@ template <class Device>
 MemoryRequirement requirement(Device& device, std::uint64_t triangle_count,
                               const BuildOptions& options) {
   core::check_options(options);
+  core::check_predictable(options);
   core::check_count(triangle_count);
   check_reference_capacity(options);
   TriangleView triangles;
   triangles.triangle_count = triangle_count;
   const Plan plan = plan_build(device, triangles, options, capacity_for(triangle_count, options));
   return {plan.tree_bytes, plan.workspace_bytes};
+}
+
+/// build() for Builder::wu2011, level by level: waits for the device, and throws what goes wrong.
+template <class Device>
+Tree build_by_levels(Device& device, const TriangleView& triangles, const BuildOptions& options) {
+  core::check_options(options);
+  core::check_view(triangles);
+  TriangleUpload<Device> upload(device, triangles);
+  DeviceBlock triangle_block(device.memory(), device.stream(), upload.bytes());
+  const TriangleView on_device = upload.enqueue(triangle_block.data());
+
+  MemoryAsYouGo memory(device.memory(), device.stream());
+  using LevelBackend = Backend<Device, MemoryAsYouGo>;
+  LevelBackend backend(device, memory, Capacity{});
+  core::wu2011::Builder<LevelBackend> builder(backend, on_device, options);
+  builder.run();
+  backend.for_each(core::one, core::CopyTo<core::BuildState>{builder.state(), backend.record()});
+  backend.stage(Stage::count);
+
+  Tree tree;
+  TreeAccess access{tree};
+  access.view() = {backend.header(), backend.nodes(), backend.leaf_offsets(), backend.references()};
+  access.record() = backend.record();
+  access.triangles() = on_device;
+  access.options() = options;
+  access.options().backend = zkd::Backend::cuda;
+  access.options().references = References::all;
+  access.triangle_capacity() = triangles.triangle_count;
+  access.workspace_bytes() = memory.most_held();
+  access.own(device, memory.tree_block(), triangle_block);
+  return tree;
 }
 
 /// build() without the check that `all` has room for references: analyse() asks for none.
@@ -232,6 +266,7 @@ Tree build_with(Device& device, const Executor& executor, const TriangleView& tr
 template <class Device>
 Tree build_on(Device& device, const Executor& executor, const TriangleView& triangles,
               const BuildOptions& options) {
+  if (options.builder == Builder::wu2011) return build_by_levels(device, triangles, options);
   check_reference_capacity(options);
   return build_with(device, executor, triangles, options);
 }
@@ -245,6 +280,10 @@ void rebuild_on(Device& device, const Executor& executor, Tree& tree,
   if (access.workspace_bytes() == 0)
     throw Error(ErrorCode::invalid_view, triangles.triangle_count,
                 "only a tree that was built on the device can be built again");
+  if (access.options().builder != Builder::morton)
+    throw Error(ErrorCode::unsupported_option, 0,
+                std::string("a tree of builder ") + to_string(access.options().builder) +
+                    " cannot be built again in its own memory");
   const Capacity capacity = capacity_for(access.triangle_capacity(), tree.options());
   if (triangles.triangle_count > capacity.triangles)
     throw Error(ErrorCode::invalid_view, triangles.triangle_count,
@@ -273,6 +312,12 @@ BuildOptions analyse_on(Device& device, const Executor& executor, const Triangle
                         const BuildOptions& options) {
   core::check_options(options);
   BuildOptions found = options;
+  if (options.builder == Builder::wu2011) {  // makes room as it goes
+    core::check_view(triangles);
+    found.backend = zkd::Backend::cuda;
+    found.references = References::all;
+    return found;
+  }
   found.reference_capacity = 0;  // so that the build ends when it has counted
   Tree tree = build_with(device, executor, triangles, found);
   core::BuildState state{};

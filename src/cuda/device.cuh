@@ -173,6 +173,13 @@ class Device {
   }
 
   template <class T, class Functor>
+  void scan(void* scratch, std::size_t& bytes, core::Count count, Functor f) {
+    ZKD_CUB_CHECK(cub::DeviceScan::InclusiveScan(
+        scratch, bytes, thrust::make_transform_iterator(numbers(), ScanValue<T, Functor>{count, f}),
+        TakeIterator<T, Functor>(count, f), Combine{}, static_cast<int>(count.bound), stream()));
+  }
+
+  template <class T, class Functor>
   void segmented_reduce(void* scratch, std::size_t& bytes, core::Count segments,
                         const std::uint32_t* offsets, core::Count elements, T* out, Functor f) {
     const SegmentOf segment_of{segments, elements, offsets};

@@ -76,7 +76,10 @@ void StageTimer::mark(Stage next, Stream stream) {
   ZKD_CUDA_CHECK(cudaStreamIsCapturing(stream, &capture));
   complete_ = next == Stage::count && capture == cudaStreamCaptureStatusNone;
   if (capture != cudaStreamCaptureStatusNone) return;
-  ZKD_CUDA_CHECK(cudaEventRecord(events_[static_cast<std::size_t>(next)], stream));
+  // Stages that a builder does not have begin and end here.
+  if (next == Stage::validate) marked_ = 0;
+  for (; marked_ <= static_cast<std::size_t>(next); ++marked_)
+    ZKD_CUDA_CHECK(cudaEventRecord(events_[marked_], stream));
 }
 
 std::array<double, static_cast<std::size_t>(Stage::count)> StageTimer::stage_ms() const {

@@ -165,6 +165,48 @@ struct SegmentIterator : WritingIterator<SegmentIterator<T>, WriteSegment<T>> {
   __host__ __device__ WriteSegment<T> place(std::ptrdiff_t i) const { return {segments, out, i}; }
 };
 
+/// For DeviceScan of sums that a functor takes: what each element adds.
+template <class T, class Functor>
+struct ScanValue {
+  core::Count count;
+  Functor f;
+
+  __device__ T operator()(std::uint32_t i) const {
+    T value{};
+    if (i < actual(count)) {
+      Functor g = loaded(f);
+      g(i, value);
+    }
+    return value;
+  }
+};
+
+/// And where the sums go.
+template <class T, class Functor>
+struct TakeSum {
+  core::Count count;
+  Functor f;
+  std::ptrdiff_t i;
+
+  __device__ const TakeSum& operator=(const T& sum) const {
+    const auto index = static_cast<std::uint32_t>(i);
+    if (index < actual(count)) {
+      Functor g = loaded(f);
+      g.take(index, sum);
+    }
+    return *this;
+  }
+};
+template <class T, class Functor>
+struct TakeIterator : WritingIterator<TakeIterator<T, Functor>, TakeSum<T, Functor>> {
+  core::Count count;
+  Functor f;
+
+  __host__ __device__ TakeIterator(core::Count the_count, const Functor& the_f)
+      : count(the_count), f(the_f) {}
+  __host__ __device__ TakeSum<T, Functor> place(std::ptrdiff_t i) const { return {count, f, i}; }
+};
+
 /// Takes what nobody wants.
 struct WriteNothing {
   template <class T>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Device memory of a build: one block for the tree, one for everything else, both of a size that is
-// known before anything runs. How much, a run of the same pipeline says that launches nothing.
+// known before anything runs. How much, a run of the same pipeline says that launches nothing. And
+// memory for single stages and builders that may wait for the device.
 #pragma once
 
 #include <algorithm>
@@ -164,12 +165,67 @@ class BlocksOnDemand {
       scratch_ = DeviceBlock(*memory_, stream_, std::max<std::size_t>(bytes, 1));
     return {scratch_.data(), scratch_.bytes()};
   }
+  [[nodiscard]] std::size_t scratch_bytes() const { return scratch_.bytes(); }
 
  private:
   MemoryResource* memory_;
   Stream stream_;
   std::vector<DeviceBlock> blocks_;
   DeviceBlock scratch_;
+};
+
+/// Memory for a build that waits for the device to know what it needs: blocks that are given back
+/// before it ends, in the order of the stream, and in the end one for the tree.
+class MemoryAsYouGo : public BlocksOnDemand {
+ public:
+  MemoryAsYouGo(MemoryResource& memory, Stream stream)
+      : BlocksOnDemand(memory, stream), memory_(&memory), stream_(stream) {}
+
+  /// A block that is counted as long as it lives, which is no longer than this memory.
+  class Held {
+   public:
+    Held() = default;
+    Held(MemoryAsYouGo& memory, std::size_t bytes)
+        : memory_(&memory), block_(*memory.memory_, memory.stream_, bytes) {
+      memory.held_ += bytes;
+      memory.most_held_ = std::max(memory.most_held_, memory.held_);
+    }
+    Held(Held&& other) noexcept
+        : memory_(std::exchange(other.memory_, nullptr)), block_(std::move(other.block_)) {}
+    Held& operator=(Held&& other) noexcept {
+      std::swap(memory_, other.memory_);
+      std::swap(block_, other.block_);
+      return *this;
+    }
+    ~Held() {
+      if (memory_ != nullptr) memory_->held_ -= block_.bytes();
+    }
+    [[nodiscard]] void* data() const noexcept { return block_.data(); }
+    [[nodiscard]] std::size_t bytes() const noexcept { return block_.bytes(); }
+
+   private:
+    MemoryAsYouGo* memory_ = nullptr;
+    DeviceBlock block_;
+  };
+  Held hold(std::size_t bytes) { return Held(*this, bytes); }
+
+  template <class Layout, class... Counts>
+  void take_for_tree(Layout& layout, Counts... counts) {
+    tree_ = DeviceBlock(*memory_, stream_, core::bytes_of(layout, counts...));
+    core::Arena arena(tree_.data());
+    layout.lay_out(arena, counts...);
+  }
+  DeviceBlock& tree_block() { return tree_; }
+
+  /// Of what hold() gave and what passes took while they ran.
+  [[nodiscard]] std::size_t most_held() const { return most_held_ + scratch_bytes(); }
+
+ private:
+  MemoryResource* memory_;
+  Stream stream_;
+  DeviceBlock tree_;
+  std::size_t held_ = 0;
+  std::size_t most_held_ = 0;
 };
 
 }  // namespace zkd::cuda

@@ -55,7 +55,7 @@ class Checker {
       : tree_(tree),
         triangles_(triangles),
         strict_(references == References::all),
-        sah_(builder == Builder::sah),
+        sah_(builder != Builder::morton),
         scale_(static_cast<double>(tree.scale())) {}
 
   std::vector<std::string> run() {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What holds of trees whose references are clipped triangles (Builder::sah), decided exactly. For
-// check_tree(), which has found the tree well-formed; everything is in tree space.
+// What holds of trees whose references are clipped triangles (Builder::sah, Builder::wu2011),
+// decided exactly. For check_tree(), which has found the tree well-formed; everything is in tree
+// space.
 #pragma once
 
 #include <cstdint>

@@ -87,6 +87,18 @@ inline constexpr std::uint32_t most_rays = 16;
 
 // ---- Options ------------------------------------------------------------------------------------
 
+/// Weights of the surface-area heuristic, in their ranges.
+inline SahOptions valid_sah_options(Bytes& bytes) {
+  constexpr std::array<float, 6> costs = {1.0F, 0.5F, 2.0F, 0.25F, 8.0F, 0.0625F};
+  constexpr std::array<float, 4> bonuses = {0.0F, 0.2F, 0.5F, 0.875F};
+  SahOptions sah;
+  sah.visit_cost = costs[bytes.below(costs.size())];
+  sah.test_cost = costs[bytes.below(costs.size())];
+  sah.areas = bytes.one_in(2) ? SahAreas::cells : SahAreas::tight;
+  sah.empty_bonus = bonuses[bytes.below(bonuses.size())];
+  return sah;
+}
+
 /// Options that every version must build with: nothing out of range, nothing unsupported.
 inline BuildOptions valid_options(Bytes& bytes) {
   constexpr std::array<std::uint32_t, 8> leaf_sizes = {4, 1, 2, 3, 9, 32, 100, 1024};
@@ -133,6 +145,11 @@ inline BuildOptions any_options(Bytes& bytes) {
       break;
     case 9:
       options.budget = bytes.any_float();
+      break;
+    case 11:
+    case 12:
+      options.builder = Builder::wu2011;
+      options.sah = valid_sah_options(bytes);
       break;
     case 10:
       options.reference_capacity = std::uint64_t{bytes.bits32()} << bytes.below(33);

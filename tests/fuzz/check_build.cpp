@@ -121,6 +121,12 @@ void check_same(const Tree& tree, const scene::Mesh& mesh, const BuildOptions& o
     }
   }
   require(verify::tree_hash(tree.clone().view()) == hash, "the clone is another tree");
+  if (tree.options().builder == Builder::wu2011) {
+    BuildOptions sah = options;
+    sah.builder = Builder::sah;
+    require(verify::tree_hash(build({.threads = 1}, mesh.view(), sah).view()) == hash,
+            "sah and wu2011 make different trees");
+  }
   if (tree.options().builder == Builder::morton &&
       (options.references == References::once || options.references == References::all)) {
     require(same_arrays(test::compose({.threads = 2}, mesh.view(), options), tree.view()),

@@ -132,8 +132,10 @@ std::vector<WayToBuild> ways_to_build() {
                             const BuildOptions& options) {
     return zkd::build(executor, triangles, options).to_host();
   };
-  const auto twice = [](cuda::Executor executor, const TriangleView& triangles,
-                        const BuildOptions& options) {
+  const auto twice = [=](cuda::Executor executor, const TriangleView& triangles,
+                         const BuildOptions& options) {
+    // Others make room as they go.
+    if (options.builder != Builder::morton) return in_one_go(executor, triangles, options);
     Array<std::byte> workspace(
         memory_requirement(executor, triangles.triangle_count, options).workspace_bytes);
     const std::span<std::byte> bytes = workspace;

@@ -14,7 +14,7 @@
 #include <zkd/tree.hpp>
 
 #include "core/frame.hpp"
-#include "cpu/sah/clip.hpp"
+#include "core/sah/clip.hpp"
 #include "scene/mesh.hpp"
 #include "verify/exact.hpp"
 
@@ -202,7 +202,7 @@ class PlainSah {
 
   SahOptions options_;
   core::SceneFrame frame_;
-  cpu::sah::Clipper clip_;
+  core::sah::Clipper clip_;
 };
 
 }  // namespace zkd::test

@@ -194,6 +194,29 @@ class Device {
     });
   }
 
+  /// A tile after the other: what each adds is known before any sum of the tile is taken.
+  template <class T, class Functor>
+  void scan(void* scratch, std::size_t& bytes, core::Count count, const Functor& f) {
+    enqueue("scan", count, f, scratch, bytes, [=](test::Random& random) {
+      const std::uint32_t n = actual(count);
+      T before{};
+      for (std::uint32_t begin = 0; begin < n;) {
+        const std::uint32_t size = std::min(n - begin, 1 + random.below(300));
+        std::vector<T> sums(size);
+        in_any_order(size, random, [&](std::uint32_t i) { loaded(f)(begin + i, sums[i]); });
+        T sum{};
+        for (T& value : sums) {
+          sum.combine(value);
+          value = before;
+          value.combine(sum);
+        }
+        in_any_order(size, random, [&](std::uint32_t i) { loaded(f).take(begin + i, sums[i]); });
+        before = sums.back();
+        begin += size;
+      }
+    });
+  }
+
   template <class T, class Functor>
   void segmented_reduce(void* scratch, std::size_t& bytes, core::Count segments,
                         const std::uint32_t* offsets, core::Count elements, T* out,

@@ -34,6 +34,9 @@ namespace zkd {
 /// invalid_option, unsupported_option), backend_unavailable, device_failure, out_of_memory; `all`
 /// without a reference_capacity is invalid_option: see analyse(). What only the device can know is
 /// thrown when the tree is asked: cuda::Tree::check().
+///
+/// Builder::wu2011 is otherwise: it waits for the device on every level, takes memory as it goes,
+/// and throws all errors at once (BuildOptions::builder).
 [[nodiscard]] ZKD_API cuda::Tree build(const cuda::Executor& executor,
                                        const TriangleView& triangles,
                                        const BuildOptions& options = {});
@@ -41,7 +44,7 @@ namespace zkd {
 /// Builds `tree` again over other triangles, in the memory it has and with the options it has: for
 /// geometry that moves. Same rules as build(). There may be no more triangles than the tree was
 /// first built for, and host memory only where it was host memory then (likewise no more
-/// positions): else invalid_view.
+/// positions): else invalid_view. Only for trees of Builder::morton (unsupported_option).
 ///
 /// With an executor that brings a workspace nothing is allocated and nothing synchronised, so that
 /// a CUDA graph can capture the call; each replay builds from what is in the arrays then. A capture
@@ -54,7 +57,8 @@ ZKD_API void rebuild(const cuda::Executor& executor, cuda::Tree& tree,
 
 /// What only the scene decides, as fixed options to build with, again and again: reference_capacity
 /// for `all`, exactly what these triangles need. Builds all but the references, waits, and gives
-/// its memory back. Triangles that move may need more: leave a margin.
+/// its memory back. Triangles that move may need more: leave a margin. For Builder::wu2011 there is
+/// nothing to find: it returns at once.
 ///
 /// Throws Error as build() and cuda::Tree::check().
 [[nodiscard]] ZKD_API BuildOptions analyse(const cuda::Executor& executor,
@@ -64,7 +68,7 @@ ZKD_API void rebuild(const cuda::Executor& executor, cuda::Tree& tree,
 /// Bytes that build() allocates on this device for `triangle_count` triangles in device memory:
 /// exactly these, whatever the scene. O(1), launches nothing. rebuild() needs workspace_bytes.
 ///
-/// Throws Error as build().
+/// Throws Error as build(); unsupported_option for other builders than morton.
 [[nodiscard]] ZKD_API MemoryRequirement memory_requirement(const cuda::Executor& executor,
                                                            std::uint64_t triangle_count,
                                                            const BuildOptions& options = {});

@@ -57,6 +57,7 @@ class ZKD_API StageTimer {
  private:
   static constexpr std::size_t events = static_cast<std::size_t>(Stage::count) + 1;
   CUevent_st* events_[events] = {};
+  std::size_t marked_ = 0;  // events of the build that runs
   bool complete_ = false;
 };
 

@@ -13,10 +13,10 @@
 #include "core/outcome.hpp"
 #include "core/pipeline.hpp"
 #include "core/quality.hpp"
+#include "core/sah/rounding.hpp"
 #include "cpu/backend.hpp"
 #include "cpu/sah/divide.hpp"
 #include "cpu/sah/front.hpp"
-#include "cpu/sah/rounding.hpp"
 
 namespace zkd::cpu::sah {
 namespace {
@@ -83,20 +83,12 @@ class Build {
     root.count = counts().listed;
     Block block =
         lay_out_block(memory_, [&](core::Arena& arena) { take_part(arena, root.count, root); });
-    // Scaling may underflow, then boxes are rounded outwards.
-    const auto in_tree_space = [scale = input_.state->frame.scale](const Box& box) {
-      Box scaled;
-      for (int a = 0; a < 3; ++a) {
-        scaled.lo[a] = float_below(static_cast<double>(box.lo[a]) * scale);
-        scaled.hi[a] = float_above(static_cast<double>(box.hi[a]) * scale);
-      }
-      return scaled;
-    };
-    if (root.count > 0) root.cell = in_tree_space(input_.state->report.bounds);
-    threads_.share(root.count, grain, [&root, in_tree_space, input = input_](Range range) {
+    const double scale = input_.state->frame.scale;
+    if (root.count > 0) root.cell = in_tree_space(input_.state->report.bounds, scale);
+    threads_.share(root.count, grain, [&root, scale, input = input_](Range range) {
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
         const std::uint32_t id = input.ids[i];
-        root.references[i] = {in_tree_space(input.boxes[id]), id};
+        root.references[i] = {in_tree_space(input.boxes[id], scale), id};
       }
     });
     return block;

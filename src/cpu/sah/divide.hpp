@@ -8,8 +8,8 @@
 #include <cstdint>
 
 #include "core/arena.hpp"
-#include "cpu/sah/clip.hpp"
-#include "cpu/sah/event.hpp"
+#include "core/sah/clip.hpp"
+#include "cpu/sah/part.hpp"
 #include "cpu/sah/sweep.hpp"
 
 namespace zkd::cpu::sah {

@@ -8,9 +8,9 @@
 #include <zkd/options.hpp>
 #include <zkd/tree.hpp>
 
-#include "cpu/sah/clip.hpp"
-#include "cpu/sah/event.hpp"
+#include "core/sah/clip.hpp"
 #include "cpu/sah/memory.hpp"
+#include "cpu/sah/part.hpp"
 #include "cpu/sah/sweep.hpp"
 
 namespace zkd::cpu::sah {

@@ -5,16 +5,15 @@
 #pragma once
 
 #include <cstdint>
-#include <utility>
 
 #include <zkd/geometry.hpp>
 #include <zkd/traversal/arithmetic.hpp>
 #include <zkd/traversal/triangle.hpp>
 
 #include "core/frame.hpp"
-#include "cpu/sah/rounding.hpp"
+#include "core/sah/rounding.hpp"
 
-namespace zkd::cpu::sah {
+namespace zkd::core::sah {
 
 /// Clips triangles to cells (Sutherland and Hodgman 1974), always the whole triangle, so that
 /// errors do not add up from level to level. The box it makes truly holds what lies in the cell,
@@ -32,12 +31,12 @@ namespace zkd::cpu::sah {
 /// nothing of the triangle lies in the cell.
 class Clipper {
  public:
-  Clipper(const TriangleView& triangles, const core::SceneFrame& frame)
+  ZKD_HOST_DEVICE Clipper(const TriangleView& triangles, const SceneFrame& frame)
       : triangles_(triangles), scale_(frame.scale), slack_(0x1p-46 * frame.largest) {}
 
   /// `box`: a box that holds what of triangle `id` lies in `cell`, within the cell. Makes it
   /// smaller where clipping finds it smaller. False: nothing of the triangle lies in the cell.
-  bool operator()(std::uint32_t id, const Box& cell, Box& box) const {
+  ZKD_HOST_DEVICE bool operator()(std::uint32_t id, const Box& cell, Box& box) const {
     Polygon room[2];
     Polygon* polygon = &room[0];
     Polygon* other = &room[1];
@@ -51,18 +50,20 @@ class Clipper {
         if (lost == polygon->count) return false;
         if (lost == 0) continue;
         cut(*polygon, a, h, inwards, *other);
-        std::swap(polygon, other);
+        Polygon* const was = polygon;
+        polygon = other;
+        other = was;
       }
     for (int a = 0; a < 3; ++a) {
       double lo = polygon->corner[0].p[a];
       double hi = lo;
       for (int i = 0; i < polygon->count; ++i) {
         const Corner& corner = polygon->corner[i];
-        lo = core::smaller(lo, corner.is_cut ? corner.p[a] - slack_ : corner.p[a]);
-        hi = core::larger(hi, corner.is_cut ? corner.p[a] + slack_ : corner.p[a]);
+        lo = smaller(lo, corner.is_cut ? corner.p[a] - slack_ : corner.p[a]);
+        hi = larger(hi, corner.is_cut ? corner.p[a] + slack_ : corner.p[a]);
       }
-      box.lo[a] = core::larger(box.lo[a], float_below(lo));
-      box.hi[a] = core::smaller(box.hi[a], float_above(hi));
+      box.lo[a] = larger(box.lo[a], float_below(lo));
+      box.hi[a] = smaller(box.hi[a], float_above(hi));
     }
     return !box.empty();
   }
@@ -79,8 +80,8 @@ class Clipper {
     int count;
   };
 
-  void place(std::uint32_t id, Polygon& polygon) const {
-    const core::Corners corners = core::corners_of(triangles_, id);
+  ZKD_HOST_DEVICE void place(std::uint32_t id, Polygon& polygon) const {
+    const Corners corners = corners_of(triangles_, id);
     polygon.count = 3;
     for (int i = 0; i < 3; ++i) {
       polygon.corner[i].is_cut = false;
@@ -89,10 +90,10 @@ class Clipper {
     }
   }
 
-  static bool is_lost(const Corner& corner, int a, double h, double inwards) {
+  ZKD_HOST_DEVICE static bool is_lost(const Corner& corner, int a, double h, double inwards) {
     return (corner.p[a] - h) * inwards < 0.0;
   }
-  static int count_lost(const Polygon& polygon, int a, double h, double inwards) {
+  ZKD_HOST_DEVICE static int count_lost(const Polygon& polygon, int a, double h, double inwards) {
     int lost = 0;
     for (int i = 0; i < polygon.count; ++i)
       lost += is_lost(polygon.corner[i], a, h, inwards) ? 1 : 0;
@@ -100,7 +101,8 @@ class Clipper {
   }
 
   /// What is left of `polygon` on the inner side of h.
-  static void cut(const Polygon& polygon, int a, double h, double inwards, Polygon& left) {
+  ZKD_HOST_DEVICE static void cut(const Polygon& polygon, int a, double h, double inwards,
+                                  Polygon& left) {
     left.count = 0;
     const Corner* from = &polygon.corner[polygon.count - 1];
     bool from_is_lost = is_lost(*from, a, h, inwards);
@@ -116,7 +118,7 @@ class Clipper {
   }
 
   /// Where the edge from a corner that is kept to one that is not meets the side.
-  static Corner meet(const Corner& kept, const Corner& lost, int a, double h) {
+  ZKD_HOST_DEVICE static Corner meet(const Corner& kept, const Corner& lost, int a, double h) {
     const double s = (h - kept.p[a]) / (lost.p[a] - kept.p[a]);
     Corner corner;
     for (int b = 0; b < 3; ++b) corner.p[b] = b == a ? h : kept.p[b] + s * (lost.p[b] - kept.p[b]);
@@ -129,4 +131,4 @@ class Clipper {
   double slack_;
 };
 
-}  // namespace zkd::cpu::sah
+}  // namespace zkd::core::sah
