@@ -245,6 +245,32 @@ TEST(QuerySinglePrecision, SmallAndLargeNeighboursDoNotLeak) {
   }
 }
 
+// What a scene of large coordinates is scaled by takes digits off small ones. Found by fuzzing.
+TEST(OffsetOrigin, TrianglesMuchSmallerThanTheirScene) {
+  for (const int exponent : {-26, -16, 0, 32, 33, 127}) {
+    const float scene = std::ldexp(1.0F, exponent);
+    const float m = 0x1p-100F * scene;
+    const std::vector<glm::vec3> corners = {{m, 0, 0},     {0, m, 0},     {0, 0, m},
+                                            {scene, 0, 0}, {0, scene, 0}, {0, 0, scene}};
+    const Tree tree = build(TriangleView{corners});
+    const TriangleView small{std::span(corners).first(3)};
+    for (const Intersector intersector : test::intersectors()) {
+      for (const glm::vec3& at : {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)}) {
+        for (const glm::vec3& direction : {glm::vec3(m), glm::vec3(-m), glm::vec3(m, 2 * m, -m)}) {
+          Ray ray;
+          ray.direction = direction;
+          ray.origin = offset_origin(small, {0.0F, at.y, at.z, 0}, direction, intersector);
+          std::vector<Hit> again(1);
+          closest_hit_brute_force({.threads = 1}, tree.view(), small, std::span(&ray, 1), again,
+                                  intersector);
+          EXPECT_FALSE(test::is_hit(again[0]))
+              << to_string(intersector) << ", scene 2^" << exponent << ", " << print(ray);
+        }
+      }
+    }
+  }
+}
+
 TEST(OffsetOrigin, StaysAFloatAtTheEndOfFloats) {
   constexpr float most = std::numeric_limits<float>::max();
   const std::vector<glm::vec3> corners = {{most, 0, 0}, {most, 1e38F, 0}, {most, 0, 1e38F}};

@@ -227,6 +227,23 @@ TEST(VerifyBand, FromFurtherAwayThanADoubleResolves) {
   expect(scene.verdict(ray, on(0, 1), Intersector::single_precision), Verdict::phantom, false);
 }
 
+// A triangle that is one point to the last digit seen from where the origin is moved to: found by
+// fuzzing.
+TEST(VerifyBand, SmallerThanALongDoubleResolves) {
+  constexpr float small = 0x1p-40F;
+  constexpr float large = 0x1p+40F;
+  const Scene scene(triangles({{small, 0, 0},
+                               {2 * small, 0, 0},
+                               {small, 0, small},
+                               {large, 0, 0},
+                               {large, 1, 0},
+                               {large, 0, 1}}));
+  const Ray ray = from_to(glm::vec3(-1024 * large), {0, 0, 0});
+  ASSERT_FALSE(scene.oracle.any_hit(ray));
+  expect(scene.verdict(ray, on(0, 1)), Verdict::phantom, true);
+  expect(scene.verdict(ray, on(0, 1.001)), Verdict::phantom, false);
+}
+
 // Of a scene of the smallest floats products underflow even when it has been scaled.
 TEST(VerifyBand, UnderflowInTheSmallestScenes) {
   constexpr float least = std::numeric_limits<float>::denorm_min();

@@ -120,8 +120,9 @@ ZKD_API void closest_hit_brute_force(const cpu::Executor& executor, const TreeVi
 ///
 /// No coordinate moves by more than 2^-46 of the largest coordinate of the triangle (2^-16 for
 /// `fast` and `single_precision`), and on to the next float. That is proven to be enough
-/// ("Spawned rays" in docs/accuracy.md). Near an edge the point may lie behind another triangle
-/// that meets this one there, as with every offset.
+/// ("Spawned rays" in docs/accuracy.md), but for `single_precision` and a triangle whose largest
+/// coordinate is less than 2^-100 of the scene's. Near an edge the point may lie behind another
+/// triangle that meets this one there, as with every offset.
 ///
 /// `hit` is one of `triangles`, not a miss. A coordinate stays at most the largest float: there the
 /// point may lie in the plane. O(1); allocates nothing.

@@ -244,8 +244,9 @@ bool may_be_missed(const Facts& facts, const Ray& ray) {
   return near(ray.t_min) || near(ray.t_max);
 }
 
-// Distance from q to a closed triangle of non-zero area: to its plane where the foot is inside,
-// else to the nearest edge.
+// Distance from q to a closed triangle: to its plane where the foot is inside, else to the nearest
+// edge. Corners that were rounded to a Long may coincide: they are then nearer to each other than
+// any bound can tell.
 Long distance(const LongPoint& q, const LongPoint (&corners)[3]) {
   const LongPoint ab = difference(corners[1], corners[0]);
   const LongPoint ac = difference(corners[2], corners[0]);
@@ -259,7 +260,8 @@ Long distance(const LongPoint& q, const LongPoint (&corners)[3]) {
     const LongPoint outward = {edge[1] * n[2] - edge[2] * n[1], edge[2] * n[0] - edge[0] * n[2],
                                edge[0] * n[1] - edge[1] * n[0]};
     inside = inside && dot(outward, to_q) <= 0.0L;
-    const Long along = std::clamp(dot(to_q, edge) / dot(edge, edge), 0.0L, 1.0L);
+    const Long squared = dot(edge, edge);
+    const Long along = squared > 0.0L ? std::clamp(dot(to_q, edge) / squared, 0.0L, 1.0L) : 0.0L;
     nearest = std::min(nearest, length({to_q[0] - along * edge[0], to_q[1] - along * edge[1],
                                         to_q[2] - along * edge[2]}));
   }
