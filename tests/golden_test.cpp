@@ -34,36 +34,50 @@ void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
 
 const Golden goldens[] = {
     {"Soup", [] { return scene::soup(20000, 1); }, "1fcb3efccc2f6161496505d512667edf",
-     "7a29789f40e441558e74aeb2370ff988", "BUDGET", "BALANCED"},
+     "7a29789f40e441558e74aeb2370ff988", "4b350d68cc899908b46fed11f71e01ff",
+     "60d26497548664a212a108f17bfc0d3c"},
     {"Sphere", [] { return scene::sphere(5); }, "8ee8c1074aff066bd88fbe96ea5a274e",
-     "01bdca89848ada207f79c676992c0cc4", "BUDGET", "BALANCED"},
+     "01bdca89848ada207f79c676992c0cc4", "fdaf716465ce870c16d9af47a12c3382",
+     "1981dc4e64599a09fe77dcada0335505"},
     {"Grid", [] { return scene::grid(12); }, "16e965475c54676b35351482cf0f633e",
-     "02136f09163f94c592e6139ca66f52a3", "BUDGET", "BALANCED"},
+     "02136f09163f94c592e6139ca66f52a3", "16e965475c54676b35351482cf0f633e",
+     "ef5f0cf5833432d01d18459330e2a88c"},
     {"Slivers", [] { return scene::slivers(2000, 1e3F, 2); }, "fc4fea2410f571d213dd00ec9ccda4d5",
-     "2a248748393a706d00e7f2390989b640", "BUDGET", "BALANCED"},
+     "2a248748393a706d00e7f2390989b640", "d8a074416d6d22e7cb055a35ec6c8a3b",
+     "3cc129bfb0d51befe84633deb878f2e9"},
     {"Needles", [] { return scene::needles(300, 3); }, "e19a971e3cb5675ed3623388c8cf0411",
-     "1f8cb4c08917c2a2d421a534bfbde26b", "BUDGET", "BALANCED"},
+     "1f8cb4c08917c2a2d421a534bfbde26b", "664bf4e5c75304b03e9254fdae6703d2",
+     "c04f1cce806195d94f2e2374c45b1776"},
     {"Flat", [] { return scene::flat(3000, 1, 4); }, "5fcac21c8862eeb6691a4c0ff3673bc1",
-     "461cf939dfdc2797fae95d0ce18e5883", "BUDGET", "BALANCED"},
+     "461cf939dfdc2797fae95d0ce18e5883", "820a2a1ed0a5de90a2e3c3908108f20c",
+     "1ef2441d762874649ac1a3c971f5f1f7"},
     {"Fan", [] { return scene::fan(1000); }, "8e12dcbaa6d0c168cc9d3a8efd149a82",
-     "5b9e91864bd24e929a7f045f3e702ac3", "BUDGET", "BALANCED"},
+     "5b9e91864bd24e929a7f045f3e702ac3", "09f8770c672ad846892d491d9c0367ff",
+     "e68e89f8aceb54a32c3a474fbf6327c9"},
     {"Identical", [] { return scene::identical(1000); }, "2bbf14a0ef07af798b0fe443c92691ee",
-     "2bbf14a0ef07af798b0fe443c92691ee", "BUDGET", "BALANCED"},
+     "2bbf14a0ef07af798b0fe443c92691ee", "2bbf14a0ef07af798b0fe443c92691ee",
+     "2bbf14a0ef07af798b0fe443c92691ee"},
     {"SameCentre", [] { return scene::same_centre(2000, 5); }, "97ed6634d80b29c255b1b5650b948629",
-     "97ed6634d80b29c255b1b5650b948629", "BUDGET", "BALANCED"},
+     "97ed6634d80b29c255b1b5650b948629", "3276f840a580df36f23dc342a1e32c1a",
+     "aafa9bd3abbda71a3d0b156c87b016f0"},
     {"SmallInLarge", [] { return scene::small_in_large(10000, 1e6F, 6); },
-     "eabfd2eabf1ce6d22a0ed8992ab49f4b", "b9c44c5bc2114d2520d4f4b92e59a59a", "BUDGET", "BALANCED"},
+     "eabfd2eabf1ce6d22a0ed8992ab49f4b", "b9c44c5bc2114d2520d4f4b92e59a59a",
+     "1c08be63950018c1c70f3590b9c62fda", "b428e492e04ae9170b7a5e55b9400652"},
     {"Staircase", [] { return scene::staircase(300); }, "ddc4d7b4de252b7ad9d3664cf54b4521",
-     "eff7bb6857d69e3ea57e9f08690c7087", "BUDGET", "BALANCED"},
+     "eff7bb6857d69e3ea57e9f08690c7087", "ddc4d7b4de252b7ad9d3664cf54b4521",
+     "eed25e98f77856c07202695313129bcb"},
     {"RandomBits", [] { return scene::random_bits(500, 7); }, "9a0a5dbdbd1486301c9275ef1cb00623",
-     "5035a17d3ab44aaabce9dc8efc9c17db", "BUDGET", "BALANCED"},
+     "5035a17d3ab44aaabce9dc8efc9c17db", "cc3302e2c6b5d93d1c09f89e7da418e2",
+     "66f9b07021b4765f6049a8041c2bcd1a"},
     {"FarAway",
      [] {
        return scene::offset(scene::soup(3000, 8), {1e6F, -3e5F, 0.0F});
      },
-     "74d0672c54e60267d5ba77f456543f35", "1a82282dd1879f2ce7f8477efa779f0d", "BUDGET", "BALANCED"},
+     "74d0672c54e60267d5ba77f456543f35", "1a82282dd1879f2ce7f8477efa779f0d",
+     "c17af1003a6f51df621a25c6a3b65b0c", "2df4f3430f10791da8fe8954983e9a2d"},
     {"Tiny", [] { return scene::scaled(scene::sphere(3), -130); },
-     "406b512e4ffc962a8b912900a08758cd", "6de3717672e2bb9ec39a730e916ae06a", "BUDGET", "BALANCED"},
+     "406b512e4ffc962a8b912900a08758cd", "6de3717672e2bb9ec39a730e916ae06a",
+     "1eed376109db2d2ab427252954721124", "3a16dc8bcfc2d6e9b7bb31d30e2cd64f"},
 };
 
 class GoldenTrees : public testing::TestWithParam<Golden> {};
@@ -90,7 +104,7 @@ INSTANTIATE_TEST_SUITE_P(Every, GoldenTrees, testing::ValuesIn(goldens),
 // What a hash stands for is a right tree.
 TEST(GoldenTree, TwoAreRight) {
   for (const scene::Mesh& mesh : {goldens[1].make(), goldens[9].make()}) {
-    for (const References references : {References::once, References::all}) {
+    for (const References references : {References::once, References::budget, References::all}) {
       const Tree tree = test::build(mesh.view(), {.references = references});
       for (const std::string& violation : verify::check_tree(tree, mesh.view()))
         ADD_FAILURE() << to_string(references) << ": " << violation;
