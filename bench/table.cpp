@@ -215,12 +215,22 @@ void print_gpu(std::ostream& out, const std::vector<Result>& results) {
   }
 }
 
+// Whether any of the builds has such a stage: several are there only where they are asked for.
+bool has_stage(const std::vector<Result>& results, std::size_t stage) {
+  return std::any_of(results.begin(), results.end(), [stage](const Result& result) {
+    return stage < result.stages_ms.size() && result.stages_ms[stage].max > 0.0;
+  });
+}
+
 // A stage's name on two lines, broken at the underscore.
 void print_stages(std::ostream& out, const std::vector<Result>& results) {
   out << "\nStages, milliseconds (medians)\n";
   std::vector<Cell> first;
   std::vector<Cell> second;
+  std::vector<std::size_t> stages;
   for (std::size_t i = 0; i < static_cast<std::size_t>(Stage::count); ++i) {
+    if (!has_stage(results, i)) continue;
+    stages.push_back(i);
     const std::string name = to_string(static_cast<Stage>(i));
     const std::size_t gap = name.find_first_of("_ ");
     const std::string upper = gap == std::string::npos ? "" : name.substr(0, gap);
@@ -234,8 +244,8 @@ void print_stages(std::ostream& out, const std::vector<Result>& results) {
   for (const Result& result : results) {
     std::vector<Cell> cells;
     for (std::size_t i = 0; i < first.size(); ++i) {
-      const bool known = i < result.stages_ms.size();
-      cells.push_back({first[i].width, known ? number(result.stages_ms[i].median) : "-"});
+      const bool known = stages[i] < result.stages_ms.size();
+      cells.push_back({first[i].width, known ? number(result.stages_ms[stages[i]].median) : "-"});
     }
     print_row(out, label_of(result), cells);
   }

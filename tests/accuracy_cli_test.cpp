@@ -138,7 +138,7 @@ TEST_F(AccuracyCli, JsonHasEveryKeyOfTheSchema) {
   const auto meshes = json["e5"]["meshes"].get<std::set<std::string>>();
   EXPECT_TRUE(meshes.contains("tetra"));  // it is closed
 
-  ASSERT_EQ(json["e6"].size(), 3 * json["scenes"].size());
+  ASSERT_EQ(json["e6"].size(), 6 * json["scenes"].size());
   for (const Json& tree : json["e6"]) {
     expect_keys(tree, {"scene", "tree", "sah", "sah_over_exact_sah", "node_visits_per_ray",
                        "triangle_tests_per_ray", "references_per_triangle", "tree_bytes", "depth",

