@@ -151,7 +151,7 @@ TEST_F(AccuracyCli, JsonHasEveryKeyOfTheSchema) {
     EXPECT_LE(tree["deepest_stack"], tree["depth"]);
   }
   expect_keys(json["e7"], {"cases", "hashes_too_many", "builds", "backends"});
-  EXPECT_EQ(json["e7"]["cases"], 2 * (json["scenes"].size() + 3));
+  EXPECT_EQ(json["e7"]["cases"], 7 * (json["scenes"].size() + 3));
   EXPECT_EQ(json["e7"]["hashes_too_many"], 0);
 
   for (const Json& speed : json["oracle"]) {
