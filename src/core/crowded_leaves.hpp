@@ -343,7 +343,7 @@ struct SplitCrowdedLeaves {
     const Count nodes{&counts->nodes, most_leaves};
     const SplitNode* before = tree.nodes;
     backend.for_each(nodes, EssentialLevel{work.keys, work.levels});
-    const LinkWriter writer{work.nodes->child,
+    const LinkWriter writer{work.nodes != nullptr ? work.nodes->child : nullptr,
                             sizeof(SplitNode) / sizeof(Link),
                             work.parents_of_nodes,
                             work.parents_of_leaves,

@@ -218,6 +218,17 @@ class MortonPipeline {
     return may_split(options_) && backend_.may_exist(Count{&counts_->splits, 1});
   }
 
+  /// Where the links and planes of nodes are, of which there may be none.
+  template <class AnyNode>
+  [[nodiscard]] static Link* links_of(AnyNode* nodes) {
+    return nodes != nullptr ? nodes->child : nullptr;
+  }
+  template <class AnyNode>
+  [[nodiscard]] static PlaneWriter planes_of(AnyNode* nodes) {
+    if (nodes == nullptr) return {};
+    return {&nodes->axis, &nodes->plane, sizeof(AnyNode) / sizeof(float)};
+  }
+
   /// Whether leaves list every triangle that touches their cells.
   [[nodiscard]] bool strict() const { return options_.references == References::all; }
 
@@ -326,7 +337,7 @@ class MortonPipeline {
 
   void compress_paths(Workspace<Code>& work) {
     backend_.stage(Stage::path_compression);
-    const LinkWriter writer{strict() ? skeleton_.nodes->child : backend_.nodes()->child,
+    const LinkWriter writer{strict() ? links_of(skeleton_.nodes) : links_of(backend_.nodes()),
                             (strict() ? sizeof(SplitNode) : sizeof(Node)) / sizeof(Link),
                             work.parents_of_nodes,
                             work.parents_of_leaves,
@@ -338,11 +349,7 @@ class MortonPipeline {
 
   void split_planes(Workspace<Code>& work) {
     backend_.stage(Stage::split_planes);
-    const PlaneWriter writer = strict()
-                                   ? PlaneWriter{&skeleton_.nodes->axis, &skeleton_.nodes->plane,
-                                                 sizeof(SplitNode) / sizeof(float)}
-                                   : PlaneWriter{&backend_.nodes()->axis, &backend_.nodes()->plane,
-                                                 sizeof(Node) / sizeof(float)};
+    const PlaneWriter writer = strict() ? planes_of(skeleton_.nodes) : planes_of(backend_.nodes());
     const CrowdByPosition crowd{work.trunk_first, recoded_.first, &counts_->crowded_trunks,
                                 recoded_.lattices, recoded_.coders};
     const auto place = [&](const auto& scene) {
