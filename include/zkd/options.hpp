@@ -107,8 +107,9 @@ struct BuildOptions {
   Builder builder = Builder::morton;
   SahOptions sah{};  ///< for Builder::sah and wu2011
 
-  /// `balanced` takes a tenth to a third off the node visits of `fast` (Bunny 12 of 100, Sibenik 26,
-  /// Conference 41) for up to twice the time; with it codes have 46 to 51 bits at most.
+  /// `balanced` takes a part of the node visits of `fast` off primary rays (Bunny 15 of 100, Sibenik
+  /// 26, Conference 41) for 1.2 to 2.6 times the time to build. Codes then have 46 to 51 bits at
+  /// most. With References::all it is no gain.
   Quality quality = Quality::fast;
 
   /// `once` takes about a tenth of the time to build that `all` takes and two thirds of the memory
