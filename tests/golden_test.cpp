@@ -67,7 +67,7 @@ const Golden goldens[] = {
      "eff7bb6857d69e3ea57e9f08690c7087", "ddc4d7b4de252b7ad9d3664cf54b4521",
      "eed25e98f77856c07202695313129bcb"},
     {"RandomBits", [] { return scene::random_bits(500, 7); }, "9a0a5dbdbd1486301c9275ef1cb00623",
-     "5035a17d3ab44aaabce9dc8efc9c17db", "cc3302e2c6b5d93d1c09f89e7da418e2",
+     "1a03a0d982249b8f4beecfc2a59fccd2", "cc3302e2c6b5d93d1c09f89e7da418e2",
      "66f9b07021b4765f6049a8041c2bcd1a"},
     {"FarAway",
      [] {

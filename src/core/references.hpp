@@ -16,6 +16,7 @@
 #include "core/key.hpp"
 #include "core/morton.hpp"
 #include "core/polygon.hpp"
+#include "core/rounding.hpp"
 #include "core/status.hpp"
 #include "core/verbs.hpp"
 
@@ -76,16 +77,9 @@ struct CellWalk {
     return link;
   }
 
-  /// The triangle's box in tree space.
+  /// The triangle's box in tree space, which holds it where scaling underflows too.
   [[nodiscard]] ZKD_HOST_DEVICE Box place(std::uint32_t id) const {
-    const float scale = static_cast<float>(frame->scale);
-    Box box;
-    for (int a = 0; a < 3; ++a) {
-      // Adding +0 turns a -0 from underflow into +0: boxes do not depend on what came first.
-      box.lo[a] = boxes[id].lo[a] * scale + 0.0F;
-      box.hi[a] = boxes[id].hi[a] * scale + 0.0F;
-    }
-    return box;
+    return in_tree_space(boxes[id], frame->scale);
   }
 
   /// A node or leaf still to be visited. Without initialisers: a stack of them costs nothing.

@@ -58,9 +58,6 @@ bool reaches_beyond(const Corners& triangle, const ExactBox& cell, std::size_t a
 std::string leaf_box(const ClippedTree& of, const Node& node, int which) {
   const std::uint32_t leaf = node.child[which].index();
   const ExactBox& cell = of.cells[leaf];
-  // Scaling down may take a coordinate out of the floats (TreeView::scale): by less than the
-  // smallest.
-  const double lost = of.tree.scale() < 1.0F ? 0x1p-149 : 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto lo = static_cast<double>(node.lo(which, static_cast<int>(axis)));
     const auto hi = static_cast<double>(node.hi(which, static_cast<int>(axis)));
@@ -71,14 +68,15 @@ std::string leaf_box(const ClippedTree& of, const Node& node, int which) {
       const Side own = side_of(triangle, axis);
       widest.lo = std::min(widest.lo, std::max(own.lo, cell.lo[axis]));
       widest.hi = std::max(widest.hi, std::min(own.hi, cell.hi[axis]));
-      if (reaches_beyond(triangle, cell, axis, lo - lost, false) ||
-          reaches_beyond(triangle, cell, axis, hi + lost, true)) {
+      if (reaches_beyond(triangle, cell, axis, lo, false) ||
+          reaches_beyond(triangle, cell, axis, hi, true)) {
         std::ostringstream text;
         text << "the box of leaf " << leaf << " does not hold what lies of triangle " << id
              << " in its cell";
         return text.str();
       }
     }
+    // Scaling may have taken a coordinate out of the floats: by less than the smallest.
     if (lo < widest.lo - 0x1p-149 || hi > widest.hi + 0x1p-149) {
       std::ostringstream text;
       text << "the box of leaf " << leaf << " is larger than what it lists";
