@@ -53,7 +53,7 @@ void print_errors(std::ostream& out, const Report& report) {
     }
     line(out, "%-29s%-12s%s", one.name.c_str(), one.rays.c_str(), cells.c_str());
   }
-  line(out, "t, ulp of float; above: hits whose t is further off than its intersector promises");
+  line(out, "t, ulp of float; above: hits whose t, u or v is further off than promised");
   line(out, "%-29s%-12s%10s%10s%10s%10s%14s", "", "rays", "median", "p99", "p99.9", "max", "above");
   for (const ErrorsOf& one : report.errors) {
     const Quantiles q = one.score.all_t_ulps().quantiles();

@@ -37,7 +37,7 @@ std::vector<std::string> Report::failures() const {
                                                   " rays outside the error band; " +
                                                   one.first_offender);
       count(one.score.above_bound.value_or(0),
-            one.name + " t beyond the published bound; " + one.first_above_bound);
+            one.name + " t, u or v beyond the published bound; " + one.first_above_bound);
     }
   }
   if (e3)

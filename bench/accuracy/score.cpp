@@ -100,7 +100,6 @@ class Examiner {
   void count_above_bound(const Hit& hit, const Truth::Answer& exact, std::uint32_t first_tie,
                          std::size_t ray) {
     const double bound = verify::stated_t_bound(*exam_.intersector, exact.condition, exact.reach);
-    if (std::isinf(bound) && *exam_.intersector == Intersector::fast) return;  // it states none
     const auto t = static_cast<double>(hit.t);
     // Half a unit of the rounding to float, and that of the exact t to double.
     const double rounding =
@@ -112,6 +111,10 @@ class Examiner {
               !verify::judge(*exam_.oracle, exam_.triangles, exam_.truth.rays()[ray], hit,
                              *exam_.intersector)
                    .t_in_bound;
+    }
+    if (!above && exam_.oracle != nullptr) {
+      above = !verify::point_in_bound(*exam_.oracle, exam_.triangles, exam_.truth.rays()[ray], hit,
+                                      *exam_.intersector);
     }
     score_.above_bound = score_.above_bound.value_or(0) + (above ? 1 : 0);
     if (above && !score_.first_above_bound) score_.first_above_bound = exam_.truth.rays()[ray];

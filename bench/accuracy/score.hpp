@@ -63,12 +63,12 @@ struct Score {
   /// plane.
   Histogram phantom_units;
 
-  /// Correct hits whose t is further off than Intersector promises; known where there is such a
-  /// promise.
+  /// Correct hits whose t, u or v is further off than Intersector promises; known where there is
+  /// such a promise.
   std::optional<std::uint64_t> above_bound;
 
   /// The first ray answered outside the band (or, where nobody judged, wrongly), and the first
-  /// whose t is beyond the bound.
+  /// whose t, u or v is beyond the bound.
   std::optional<Ray> first_offender;
   std::optional<Ray> first_above_bound;
 
@@ -86,7 +86,7 @@ struct Score {
 [[nodiscard]] double float_ulp(double x);
 
 /// What score() holds answers against. With `oracle` and `intersector` every wrong answer is judged
-/// by the error band of that intersector (verify/band.hpp), and every t by its bound.
+/// by the error band of that intersector (verify/band.hpp), and every t, u and v by its bound.
 struct Exam {
   const Truth& truth;
   const TriangleView& triangles;

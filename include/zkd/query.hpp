@@ -39,23 +39,26 @@ namespace zkd {
 /// coordinate: 32 C), and k = |d| |n| / |d . n| says how edge-on it is seen (d the direction, n the
 /// normal; 1: from the front). "Within e" means: hit and miss are those of exact arithmetic for a
 /// triangle whose corners are moved by e at most along each axis, the same corner in the same way
-/// for all its edges. |t - exact t| |d| is bounded too, to which rounding t to a float adds half a
-/// unit in its last place. For scenes whose coordinates are less than 2^100 apart.
+/// for all its edges. |t - exact t| |d| is bounded too, and how far along an axis the point that u
+/// and v name may lie from the ray's at t; rounding to floats adds half a unit in the last place of
+/// each of the three. For scenes whose coordinates are less than 2^100 apart.
 enum class Intersector : std::uint8_t {
   /// Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013. Single precision
   /// rejects, with an error bound; double precision decides what is left and gives t, u and v.
-  /// Within 6 * 2^-53 R; t to (9 k + 25) * 2^-53 R. The signs of its edge functions are those of
-  /// one set of sheared corners, exactly, so triangles that share an edge never both miss a ray
-  /// through it.
+  /// Within 6 * 2^-53 R; t to (9 k + 25) * 2^-53 R; u and v to 34 * 2^-53 R. The signs of its edge
+  /// functions are those of one set of sheared corners, exactly, so triangles that share an edge
+  /// never both miss a ray through it.
   watertight,
 
   /// Moeller, Trumbore, JGT 1997, in single precision. Rays may slip between triangles that share
-  /// an edge, and t is as good as single precision lets it be: the point found on the ray lies
-  /// within 32 * 2^-24 R of the triangle, else double precision decides.
+  /// an edge: the sign of an edge function is certain beyond 12 * 2^-24 times the terms that it is
+  /// summed from. The point found on the ray lies within 32 * 2^-24 R of the triangle, else double
+  /// precision decides: t to 56 k * 2^-24 R, u and v to 32 * 2^-24 R.
   fast,
 
   /// Woop, Benthin, Wald in single precision, with Kahan's difference of products: for devices on
-  /// which double precision is slow. Watertight. Within 9 * 2^-24 R; t to (13 k + 26) * 2^-24 R.
+  /// which double precision is slow. Watertight. Within 9 * 2^-24 R; t to (13 k + 26) * 2^-24 R;
+  /// u and v to 38 * 2^-24 R.
   single_precision,
 
   /// The answers of `watertight`, bit for bit, by double precision alone: what its filter

@@ -122,6 +122,12 @@ struct Judged {
     return shift ? rounded(many_digits(s) - *shift) : Long{s};
   }
 
+  // How far from its triangle a hit may lie: a bound along each axis is one of sqrt(3) times as
+  // much on the distance.
+  [[nodiscard]] double distance(double reach) const {
+    return 1.7320508075688773 * (bounds.unit * bounds.hit * reach + lost);
+  }
+
   const Ray& ray;
   Bounds bounds;
   double underflow;
@@ -222,13 +228,14 @@ Facts examine(const Judged& judged, const Corners& corners) {
   const PlaneHit plane = plane_hit(judged.o, d, corners);
   facts.along = {plane.denominator, depth * product * terms(side[0], side[1])};
   facts.t = plane.t;
-  // In the moved triangle's plane; and how far t may be from that.
-  facts.t_allowance = (moved[0] + moved[1]) * plane.normal / std::abs(plane.denominator) +
-                      bounds.unit * bounds.t * furthest / depth +
-                      (bounds.unit == 0.0 ? 0.0 : 0x1p-51 * std::abs(plane.t) + smallest_float);
-  if (bounds.product != 0.0)
-    facts.t_allowance +=
-        bounds.unit * bounds.hit * facts.reach * plane.normal / std::abs(plane.denominator);
+  // In the moved triangle's plane, and how far t may be from that; of `fast`, within the distance
+  // to the triangle that is allowed.
+  facts.t_allowance =
+      (bounds.product == 0.0
+           ? (moved[0] + moved[1]) * plane.normal / std::abs(plane.denominator) +
+                 bounds.unit * bounds.t * furthest / depth
+           : judged.distance(facts.reach) * plane.normal / std::abs(plane.denominator)) +
+      (bounds.unit == 0.0 ? 0.0 : 0x1p-51 * std::abs(plane.t) + smallest_float);
   return facts;
 }
 
@@ -315,10 +322,40 @@ bool may_be_invented(const Judged& judged, const Facts& facts, const Hit& hit,
   if (!left && !right) return false;
   // All three exactly zero without a rounding: every intersector sees the coplanar ray.
   if (facts.along.value == 0.0 && !rounded) return false;
-  // A bound along each axis is one of sqrt(3) times as much on the distance.
-  const double allowed =
-      1.7320508075688773 * (judged.bounds.unit * judged.bounds.hit * facts.reach + judged.lost);
-  return distance_of_answer(judged, static_cast<double>(hit.t), corners) <= Long{allowed};
+  return distance_of_answer(judged, static_cast<double>(hit.t), corners) <=
+         Long{judged.distance(facts.reach)};
+}
+
+// Whether the point that u and v name is as near to the ray's at t as promised, axis by axis.
+bool is_point_in_bound(const Judged& judged, const Hit& hit, const Corners& corners) {
+  const auto t = static_cast<double>(hit.t);
+  const auto u = static_cast<double>(hit.u);
+  const auto v = static_cast<double>(hit.v);
+  LongPoint seen[3];
+  double reach = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      seen[i][a] = judged.from_origin(corners[i][a], a);
+      reach = std::max(reach, static_cast<double>(std::abs(seen[i][a])));
+    }
+  }
+  const Long along = judged.from_origin_along(t);
+  const LongPoint ab = difference(seen[1], seen[0]);
+  const LongPoint ac = difference(seen[2], seen[0]);
+  // What a Long, which may be no more than a double, loses here.
+  const double computed = 0x1p-51 * reach;
+  const double promised = judged.bounds.unit * judged.bounds.point * reach + judged.lost + computed;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double off = static_cast<double>(
+        std::abs(seen[0][a] + Long{u} * ab[a] + Long{v} * ac[a] - along * Long{judged.d[a]}));
+    // Half a unit of each, and what t gained where the origin was moved.
+    const double rounded = 0.5 * (float_ulp(t) * std::abs(judged.d[a]) +
+                                  float_ulp(u) * static_cast<double>(std::abs(ab[a])) +
+                                  float_ulp(v) * static_cast<double>(std::abs(ac[a]))) +
+                           0x1p-51 * std::abs(t * judged.d[a]);
+    if (!(off <= promised + rounded)) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -327,12 +364,18 @@ Bounds bounds_of(Intersector intersector) noexcept {
   switch (intersector) {
     case Intersector::watertight:
     case Intersector::double_precision:
-      return {.unit = 0x1p-53, .corner = 2.0, .sheared = 4.0, .hit = 20.0, .t = 14.0};
-    case Intersector::single_precision:
-      return {.unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 24.0, .t = 15.0};
-    case Intersector::fast:
       return {
-          .unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 32.0, .t = 15.0, .product = 16.0};
+          .unit = 0x1p-53, .corner = 2.0, .sheared = 4.0, .hit = 20.0, .t = 14.0, .point = 34.0};
+    case Intersector::single_precision:
+      return {
+          .unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 24.0, .t = 15.0, .point = 38.0};
+    case Intersector::fast:
+      return {.unit = 0x1p-24,
+              .corner = 4.0,
+              .sheared = 5.0,
+              .hit = 32.0,
+              .point = 32.0,
+              .product = 12.0};
     case Intersector::exact:
       break;
   }
@@ -347,7 +390,7 @@ double stated_t_bound(Intersector intersector, double condition, double reach) n
     case Intersector::single_precision:
       return (13.0 * condition + 26.0) * 0x1p-24 * reach;
     case Intersector::fast:
-      return std::numeric_limits<double>::infinity();
+      return 56.0 * condition * 0x1p-24 * reach;
     case Intersector::exact:
       break;
   }
@@ -368,6 +411,12 @@ const char* to_string(Verdict::Kind kind) noexcept {
   return "?";
 }
 
+bool point_in_bound(const Oracle& oracle, const TriangleView& triangles, const Ray& ray,
+                    const Hit& hit, Intersector intersector) {
+  return is_point_in_bound(Judged(oracle, ray, intersector), hit,
+                           *finite_corners(triangles, hit.triangle));
+}
+
 Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ray, const Hit& hit,
               Intersector intersector) {
   const ExactHit exact = oracle.closest_hit(ray);
@@ -382,8 +431,11 @@ Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ra
     const double off = std::abs(static_cast<double>(hit.t) - exact.t);
     verdict.t_ulp =
         std::isnan(off) ? std::numeric_limits<double>::infinity() : off / float_ulp(exact.t);
+    const Judged judged(oracle, ray, intersector);
+    verdict.point_in_bound =
+        is_point_in_bound(judged, hit, *finite_corners(triangles, hit.triangle));
     if (verdict.t_ulp > 0.5) {
-      const Facts facts = examined(Judged(oracle, ray, intersector), hit.triangle);
+      const Facts facts = examined(judged, hit.triangle);
       // exact.t was rounded to a double.
       verdict.t_in_bound =
           off <= facts.t_allowance + 0.5 * float_ulp(exact.t) + 0x1p-52 * std::abs(exact.t);

@@ -22,15 +22,18 @@ namespace zkd::verify {
 ///   hit and miss are those of a triangle whose corners are moved so far.
 /// - A hit lies within unit * hit * max |p| of its triangle, along each axis.
 /// - t is that of the moved triangle to unit * t * max |p_z / d_z|.
+/// - The point that u and v name lies within unit * point * max |p| of the ray's, along each axis.
 ///
 /// `fast` moves no corners: its signs are off by unit * product times the terms they are summed
-/// from, or, where it asks double precision, are those of that one's moved corners.
+/// from, or, where it asks double precision, are those of that one's moved corners. Its t is what
+/// the distance to the triangle leaves.
 struct Bounds {
   double unit;
   double corner;
   double sheared;
   double hit;
-  double t;
+  double t = 0.0;
+  double point;
   double product = 0.0;
 };
 
@@ -38,7 +41,7 @@ struct Bounds {
 [[nodiscard]] Bounds bounds_of(Intersector intersector) noexcept;
 
 /// What zkd/query.hpp states of |t - exact t| |d|, before t is rounded to a float: for
-/// `condition`, k there, and `reach`, R. Infinite where it states nothing.
+/// `condition`, k there, and `reach`, R.
 [[nodiscard]] double stated_t_bound(Intersector intersector, double condition,
                                     double reach) noexcept;
 
@@ -55,10 +58,17 @@ struct Verdict {
   double t_ulp = 0.0;      ///< |t - exact t| in float ulps of the exact t; 0 unless a correct hit
   bool t_in_bound = true;  ///< t is as near to the exact one as the intersector promises; true
                            ///< unless a correct hit
+  bool point_in_bound = true;  ///< so is the point that u and v name to the ray's at t; likewise
+
+  [[nodiscard]] bool in_bound() const { return t_in_bound && point_in_bound; }
 };
 
 /// "correct", ... Static storage.
 const char* to_string(Verdict::Kind kind) noexcept;
+
+/// Verdict::point_in_bound, of a hit on a valid triangle.
+[[nodiscard]] bool point_in_bound(const Oracle& oracle, const TriangleView& triangles,
+                                  const Ray& ray, const Hit& hit, Intersector intersector);
 
 /// Judges `hit`, what `intersector` answered to `ray`. `triangles` is what the oracle was made
 /// from.

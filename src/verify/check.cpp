@@ -30,8 +30,8 @@ void count(Part& part, const Verdict& verdict, std::uint64_t ray, bool hit) {
     case Verdict::correct:
       ++summary.correct;
       if (hit) part.t_ulps.push_back(static_cast<float>(verdict.t_ulp));
-      if (verdict.t_in_bound) return;
-      ++summary.t_outside;
+      if (verdict.in_bound()) return;
+      ++summary.beyond_bound;
       break;
     case Verdict::missed:
       ++summary.missed;
@@ -70,7 +70,7 @@ void Summary::add_counts(const Summary& other) {
   missed += other.missed;
   phantom += other.phantom;
   wrong_triangle += other.wrong_triangle;
-  t_outside += other.t_outside;
+  beyond_bound += other.beyond_bound;
   in_band.missed += other.in_band.missed;
   in_band.phantom += other.in_band.phantom;
   in_band.wrong_triangle += other.in_band.wrong_triangle;

@@ -35,13 +35,13 @@ struct Summary {
   Mistakes in_band;
   double t_ulp_p999 = 0.0;  ///< 99.9th percentile over correct hits, see Verdict::t_ulp
   double t_ulp_max = 0.0;
-  std::uint64_t t_outside = 0;  ///< correct hits whose t is further off than promised
+  std::uint64_t beyond_bound = 0;  ///< correct hits whose t, u or v is further off than promised
   std::vector<std::uint64_t> first_offenders;  ///< the first 10 rays answered outside the band or
-                                               ///< with a t outside
+                                               ///< with a t, u or v beyond its bound
 
   /// Answers that are errors: the target is 0.
   [[nodiscard]] std::uint64_t outside_band() const {
-    return missed + phantom + wrong_triangle - in_band.total() + t_outside;
+    return missed + phantom + wrong_triangle - in_band.total() + beyond_bound;
   }
 
   /// Adds the counts of other rays, not their t_ulp figures nor their first_offenders.

@@ -206,8 +206,9 @@ void check_against_oracle(const Scene& scene, const verify::Oracle& oracle,
     const Ray ray = within_float(scene.rays[i]);
     const verify::Verdict verdict =
         verify::judge(oracle, scene.mesh.view(), ray, hits[i], scene.intersector);
-    if (!verdict.t_in_bound) {
-      fail_at("t", scene.intersector, ray, hits[i], to_hit(oracle.closest_hit(ray)));
+    if (!verdict.in_bound()) {
+      fail_at(verdict.t_in_bound ? "u or v" : "t", scene.intersector, ray, hits[i],
+              to_hit(oracle.closest_hit(ray)));
     }
     if (verdict.kind == verify::Verdict::correct || verdict.in_band) continue;
     fail_at(verify::to_string(verdict.kind), scene.intersector, ray, hits[i],
