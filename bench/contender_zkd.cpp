@@ -8,6 +8,7 @@
 #include <zkd/build.hpp>
 #include <zkd/cpu/wide_tree.hpp>
 
+#include "literal_walk.hpp"
 #include "memory.hpp"
 
 namespace zkd::bench {
@@ -28,7 +29,9 @@ class CpuContender final : public ZkdContender {
     const Stopwatch watch;
     tree_ = zkd::build(executor_, triangles_, options_);
     if (layout_ == Layout::wide) wide_ = cpu::widen(executor_, tree_.view(), triangles_);
-    return watch.ms();
+    const double whole = watch.ms();
+    if (layout_ != Layout::literal) return whole;
+    return whole - tree_.statistics().stage_ms[static_cast<std::size_t>(Stage::tight_boxes)];
   }
 
   Timing trace(std::size_t, RayKind kind, std::span<const Ray> rays) override {
@@ -72,6 +75,7 @@ class CpuContender final : public ZkdContender {
     }
     result.options = tree.options();
     result.layout = layout_;
+    if (layout_ == Layout::literal) result.statistics.sah_cost = sah_cost_of_cells(tree.view());
     result.options.backend = Backend::cpu;  // an executor was given, so the option stays as asked
   }
 
@@ -87,6 +91,8 @@ class CpuContender final : public ZkdContender {
     const Stopwatch watch;
     if (layout_ == Layout::wide)
       cpu::closest_hit(executor_, wide_.view(), rays, hits, costs, intersector_);
+    else if (layout_ == Layout::literal)
+      closest_hit_literally(executor_, tree_.view(), triangles_, rays, hits, costs);
     else
       zkd::closest_hit(executor_, tree_.view(), triangles_, rays, hits, costs, intersector_);
     return watch.ms();
@@ -94,7 +100,13 @@ class CpuContender final : public ZkdContender {
   double any_hit(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                  std::span<TraversalCost> costs) override {
     const Stopwatch watch;
-    if (layout_ == Layout::wide)
+    if (layout_ == Layout::literal) {  // the poster has no other question
+      hits_.resize(rays.size());
+      closest_hit_literally(executor_, tree_.view(), triangles_, rays, hits_, costs);
+      std::transform(hits_.begin(), hits_.end(), occluded.begin(), [](const Hit& hit) {
+        return static_cast<std::uint8_t>(hit.triangle != no_triangle ? 1 : 0);
+      });
+    } else if (layout_ == Layout::wide)
       cpu::any_hit(executor_, wide_.view(), rays, occluded, costs, intersector_);
     else
       zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded, costs, intersector_);

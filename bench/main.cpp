@@ -88,8 +88,9 @@ int run(const Options& options) {
     throw UsageError("--images: this zkd-bench was built without OpenImageIO");
   }
   if (where.backend == Backend::cuda &&
-      std::count(options.layouts.begin(), options.layouts.end(), Layout::wide) > 0) {
-    throw UsageError("--layout: wide is for the CPU; add --backend cpu");
+      std::any_of(options.layouts.begin(), options.layouts.end(),
+                  [](Layout layout) { return layout != Layout::binary; })) {
+    throw UsageError("--layout: wide and literal are for the CPU; add --backend cpu");
   }
   const bool json_only = options.json && *options.json == "-";
   make_image_folder(options);

@@ -29,7 +29,7 @@ constexpr std::array all_invalid{InvalidTriangles::error, InvalidTriangles::skip
 constexpr std::array all_ray_kinds{RayKind::primary, RayKind::diffuse, RayKind::shadow};
 constexpr std::array all_instructions{cpu::InstructionSet::automatic, cpu::InstructionSet::portable,
                                       cpu::InstructionSet::avx2};
-constexpr std::array all_layouts{Layout::binary, Layout::wide};
+constexpr std::array all_layouts{Layout::binary, Layout::wide, Layout::literal};
 constexpr std::array all_peers{PeerLibrary::embree};
 
 const char* on_off(bool value) { return value ? "on" : "off"; }
@@ -38,6 +38,11 @@ bool on_or_off(const std::string& option, const std::string& value) {
   if (value == "on") return true;
   if (value == "off") return false;
   throw UsageError(option + ": '" + value + "' is not one of on, off");
+}
+
+// The poster knows one tree.
+bool is_the_posters(Builder builder, Quality quality, References references) {
+  return builder == Builder::morton && quality == Quality::fast && references == References::once;
 }
 
 // What distinguishes a setting: its values on the options that were given more than one.
@@ -60,7 +65,10 @@ std::string label_of(const BuildOptions& setting, Layout layout, bool builders, 
 
 const char* to_string(PeerLibrary) noexcept { return "embree"; }
 
-const char* to_string(Layout layout) noexcept { return layout == Layout::wide ? "wide" : "binary"; }
+const char* to_string(Layout layout) noexcept {
+  constexpr const char* names[] = {"binary", "wide", "literal"};
+  return names[static_cast<std::size_t>(layout)];
+}
 
 std::vector<std::string> flags_of(const BuildOptions& options) {
   return {"--builder",
@@ -241,6 +249,9 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
             (one_policy != policies.front() || one_quality != qualities.front()))
           continue;
         for (const Layout one_layout : layouts) {
+          if (one_layout == Layout::literal &&
+              !is_the_posters(one_builder, one_quality, one_policy))
+            continue;
           BuildOptions setting = base;
           setting.builder = one_builder;
           setting.quality = one_quality;
@@ -255,10 +266,18 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
     }
   }
 
+  if (options.settings.empty())
+    throw UsageError(
+        "--layout: literal is for --builder morton, --quality fast, --references once");
+
   options.threads = static_cast<int>(threads);
   options.instructions = value_named(all_instructions, "--instructions", instructions);
   options.measure_quality = on_or_off("--measure-quality", measure_quality);
   options.intersector = value_named(all_intersectors, "--intersector", intersector);
+  if (options.intersector != Intersector::watertight &&
+      std::find(options.layouts.begin(), options.layouts.end(), Layout::literal) !=
+          options.layouts.end())
+    throw UsageError("--layout: literal is for --intersector watertight");
   options.rays = values_listed(all_ray_kinds, "--rays", rays);
   std::sort(options.rays.begin(), options.rays.end());
   options.size = static_cast<unsigned>(size);

@@ -26,10 +26,11 @@ enum class RayKind : std::uint8_t { primary, diffuse, shadow };
 [[nodiscard]] const char* to_string(RayKind kind) noexcept;
 
 /// What rays are traced through: the tree as it was built, or, on the CPU, the form that
-/// cpu::widen makes of it. Making that is a part of the time of a build.
-enum class Layout : std::uint8_t { binary, wide };
+/// cpu::widen makes of it (making that is a part of the time of a build), or the tree's planes
+/// alone, as literal_walk.hpp has it (whose boxes are no part of that time).
+enum class Layout : std::uint8_t { binary, wide, literal };
 
-/// "binary", "wide". Static storage.
+/// "binary", "wide", "literal". Static storage.
 [[nodiscard]] const char* to_string(Layout layout) noexcept;
 
 /// Repetitions of one measurement, milliseconds.

@@ -16,7 +16,7 @@ def measure(program, folder, scene, threads):
     command = [
         program, scene, "--backend", "cpu", "--threads", str(threads), "--size", SIZE,
         "--repeat", REPEAT, "--builder", "morton,sah,wu2011", "--quality", "fast,balanced",
-        "--references", "once,budget,all,auto", "--layout", "binary,wide", "--peers", "embree",
+        "--references", "once,budget,all,auto", "--layout", "binary,wide,literal", "--peers", "embree",
         "--json", "-",
     ]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -29,6 +29,8 @@ def measure(program, folder, scene, threads):
 
 def name_of(result):
     options = result["options"]
+    if options["layout"] == "literal":
+        return "literal poster"
     if options["builder"] != "morton":
         return {"sah": "exact SAH", "wu2011": "Wu et al. 2011"}[options["builder"]]
     asked = result["label"].split(" ")[2]  # what `auto` chose is in the options
@@ -55,19 +57,20 @@ def table(results):
     print("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|")
     wide_of = {name_of(r): r for r in results if r["options"]["layout"] == "wide"}
     for result in results:
-        if result["options"]["layout"] != "binary":
+        if result["options"]["layout"] == "wide":
             continue
-        wide = wide_of[name_of(result)]
+        wide = wide_of.get(name_of(result))  # the literal walk has no wide form
         costs = [f"{result['trace'][kind]['node_visits_per_ray']:.1f}, "
                  f"{result['trace'][kind]['triangle_tests_per_ray']:.1f}" for kind in KINDS]
-        speeds = [f"{wide['trace'][kind]['mrays_per_s']:.2f}" for kind in KINDS]
+        speeds = [f"{wide['trace'][kind]['mrays_per_s']:.2f}" if wide else "" for kind in KINDS]
+        of_medium = f"{rays_per_second(wide['trace']) / medium:.2f}" if wide else ""
         tree = result["tree"]
         ratio = tree["sah"] / exact["binary"]["tree"]["sah"]
         megabytes = result["allocated_bytes"]["tree"] / 1e6
         print(f"| {name_of(result)} | {result['build_ms']['median']:.1f} "
               f"| {tree['references'] / result['triangles']:.2f} | {ratio:.2f} "
               f"| {' | '.join(costs)} | {rays_per_second(result['trace']):.2f} "
-              f"| {' | '.join(speeds)} | {rays_per_second(wide['trace']) / medium:.2f} "
+              f"| {' | '.join(speeds)} | {of_medium} "
               f"| {megabytes:.1f} |")
     for name in ("low", "medium"):
         peer = peers[name]

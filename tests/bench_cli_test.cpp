@@ -321,6 +321,22 @@ TEST_F(BenchCli, LayoutsAreMeasuredSideBySide) {
             json["results"][1]["allocated_bytes"]["tree"]);
 }
 
+TEST_F(BenchCli, ThePosterTakenAtItsWordIsALayout) {
+  const Json json = run_json(
+      "tetra.obj --backend cpu --layout binary,literal --references all,once" + std::string(quick));
+  ASSERT_EQ(json["results"].size(), 3u);  // of `once` only
+  EXPECT_EQ(json["results"][2]["label"], "once literal");
+  EXPECT_EQ(json["results"][2]["options"]["layout"], "literal");
+  EXPECT_GT(json["results"][2]["trace"]["primary"]["hits"], 0);
+  EXPECT_GT(json["results"][2]["tree"]["sah"], 0.0);
+  const Outcome none = run("tetra.obj --layout literal --references all" + std::string(quick));
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.err.find("--references once"), std::string::npos) << none.err;
+  const Outcome other = run("tetra.obj --layout literal --intersector fast" + std::string(quick));
+  EXPECT_EQ(other.status, 2);
+  EXPECT_NE(other.err.find("--intersector watertight"), std::string::npos) << other.err;
+}
+
 TEST_F(BenchCli, AnswersAreJudgedByTheBandOfTheirIntersector) {
   if (!can_check()) GTEST_SKIP() << "built without GMP";
   for (const char* name : {"watertight", "fast", "single", "double", "exact"}) {

@@ -11,6 +11,7 @@
 #include <zkd/traversal/traverse.hpp>
 
 #include "cpu/threads.hpp"
+#include "literal_walk.hpp"
 
 namespace zkd::bench::accuracy {
 namespace {
@@ -72,22 +73,6 @@ class PaddedBoxTest {
   PlainBoxes boxes_;
 };
 
-// The hits on a leaf's triangles that lie between `near` and `far`. Returns whether there was one.
-bool intersect_leaf(const TreeView& tree, const TriangleView& triangles, const Intersect& intersect,
-                    std::uint32_t leaf, Real near, Real far, Candidate& best) {
-  bool found = false;
-  for (std::uint32_t r = tree.leaf_offsets[leaf]; r < tree.leaf_offsets[leaf + 1]; ++r) {
-    const std::uint32_t id = tree.references[r];
-    Candidate candidate = best;
-    if (!intersect(core::corners_of(triangles, id), id, candidate)) continue;
-    const Real t = static_cast<float>(candidate.t.value);
-    if (!(near <= t && t <= far)) continue;
-    best = candidate;
-    found = true;
-  }
-  return found;
-}
-
 struct Waiting {
   std::uint32_t link;
   float near;
@@ -107,7 +92,7 @@ Candidate walk_naively(const TreeView& tree, const TriangleView& triangles, cons
     if (entry.near > best.limit.value) continue;
     const Link link{entry.link};
     if (link.is_leaf()) {
-      intersect_leaf(tree, triangles, intersect, link.index(), entry.near, entry.far, best);
+      intersect_within(tree, triangles, intersect, link.index(), entry.near, entry.far, best);
       continue;
     }
     const Node& node = tree.nodes[link.index()];
@@ -121,57 +106,6 @@ Candidate walk_naively(const TreeView& tree, const TriangleView& triangles, cons
     }
   }
   return best;
-}
-
-// The part of the ray inside the scene box; nothing where it passes beside.
-bool clip_to_scene(const TreeView& tree, const PreparedRay& ray, Real& near, Real& far) {
-  const Box bounds = tree.bounds();
-  const Real scale = tree.scale();
-  for (int a = 0; a < 3; ++a) {
-    const bool negative = ray.is_negative(static_cast<std::uint32_t>(a));
-    const Real low = Real(bounds.lo[a]) * scale;
-    const Real high = Real(bounds.hi[a]) * scale;
-    near = core::larger(near, ((negative ? high : low) - ray.origin[a]) * ray.inverse[a]);
-    far = core::smaller(far, ((negative ? low : high) - ray.origin[a]) * ray.inverse[a]);
-  }
-  return near <= far;
-}
-
-// Kaplan's walk over the planes of a kd-tree: cells front to back, each an interval of t.
-Candidate walk_literally(const TreeView& tree, const TriangleView& triangles,
-                         const PreparedRay& ray, const Intersect& intersect) {
-  Candidate best;
-  Real near = ray.first;
-  Real far = ray.last;
-  if (!clip_to_scene(tree, ray, near, far)) return best;
-  Waiting stack[max_depth + 1];
-  std::size_t waiting = 0;
-  Link link = tree.root();
-  for (;;) {
-    while (!link.is_leaf()) {
-      const Node& node = tree.nodes[link.index()];
-      const Real at = (Real(node.plane) - core::element(ray.origin, node.axis)) *
-                      core::element(ray.inverse, node.axis);
-      const bool negative = ray.is_negative(node.axis);
-      const Link first = node.child[negative ? 1 : 0];
-      const Link second = node.child[negative ? 0 : 1];
-      if (at > far) {
-        link = first;
-      } else if (at < near) {
-        link = second;
-      } else {
-        stack[waiting++] = {second.bits, at.value, far.value};
-        link = first;
-        far = at;
-      }
-    }
-    if (intersect_leaf(tree, triangles, intersect, link.index(), near, far, best)) return best;
-    if (waiting == 0) return best;
-    const Waiting& next = stack[--waiting];
-    link = Link{next.link};
-    near = next.near;
-    far = next.far;
-  }
 }
 
 template <class Trace>
@@ -276,10 +210,7 @@ void closest_hit(Walk walk, Intersector intersector, const cpu::Executor& execut
                    });
       return;
     case Walk::literal:
-      for_each_ray(executor, tree, rays, hits,
-                   [=](const PreparedRay& ray, const Intersect& intersect) {
-                     return walk_literally(tree, triangles, ray, intersect);
-                   });
+      closest_hit_literally(executor, tree, triangles, rays, hits);
       return;
   }
 }

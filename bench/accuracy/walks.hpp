@@ -20,8 +20,7 @@ enum class Walk {
             ///< the next two do
   padded,   ///< boxes as they are, where a ray leaves them moved out by 3 ulp of t
   naive,    ///< boxes as they are, a hit accepted between entry and exit of its leaf's box only
-  literal,  ///< the poster's text: split planes alone, a triangle known to one leaf only, a hit
-            ///< accepted inside that leaf's interval only, the first leaf with a hit ends the walk
+  literal,  ///< the poster's text (literal_walk.hpp)
 };
 
 /// "library", ... Static storage.
