@@ -200,6 +200,7 @@ struct BeginTree {
 
 /// Divides one node in the round of its depth.
 struct DivideClusters {
+  static constexpr bool is_long = true;
   ClusterWorkspace work;
   std::uint32_t depth;
 

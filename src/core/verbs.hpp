@@ -9,7 +9,7 @@
 // A backend has these verbs; arrays are in the backend's own memory.
 //
 //   stage(Stage)                       names the work that follows, for clocks and profilers
-//   for_each(count, f)                 f(i)
+//   for_each(count, f)                 f(i); one is worth a thread where F::is_long is true
 //   reduce(count, &out, f)             out = T{}; f(i, out) for all i, in any grouping (T::combine)
 //   histogram(count, f, bins, out)     out[b] = how many i have f(i) = b, below `bins` (at most
 //                                      most_bins)
@@ -73,6 +73,10 @@ template <class Functor>
 concept Loads = requires(Functor& f) {
   f.load();
 };
+
+/// Functors each of whose elements is much work (see above).
+template <class Functor>
+concept Long = Functor::is_long;
 
 /// Keys and values, and room to move them to and fro.
 template <class Key>

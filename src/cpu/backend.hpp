@@ -63,7 +63,7 @@ class Backend {
 
   template <class Functor>
   void for_each(core::Count count, Functor f) {
-    threads_.share(size(count), grain, [f](Range range) {
+    threads_.share(size(count), core::Long<Functor> ? 1 : grain, [f](Range range) {
       Functor g = loaded(f);
       for (std::uint32_t i = range.begin; i < range.end; ++i) g(i);
     });
