@@ -31,6 +31,13 @@ Point point(const glm::vec3& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
 }
 
+// An answer: a triangle and t.
+struct On {
+  std::uint32_t triangle;
+  double t;
+};
+On on(std::uint32_t triangle, double t) { return {triangle, t}; }
+
 struct Scene {
   explicit Scene(scene::Mesh mesh_) : mesh(std::move(mesh_)), oracle(mesh.view()) {}
 
@@ -39,15 +46,22 @@ struct Scene {
                                 Intersector intersector = Intersector::single_precision) const {
     return judge(oracle, mesh.view(), ray, hit, intersector);
   }
-  [[nodiscard]] Verdict missed(const Ray& ray) const { return verdict(ray, Hit{}); }
-
-  // The exact answer, rounded.
-  [[nodiscard]] Hit rounded(const Ray& ray, const ExactHit& exact) const {
-    const std::uint32_t triangle = exact.ties.front();
-    const auto [u, v] = barycentrics(point(ray.origin), point(ray.direction),
-                                     *finite_corners(mesh.view(), triangle));
-    return {static_cast<float>(exact.t), static_cast<float>(u), static_cast<float>(v), triangle};
+  // With u and v of where the ray meets the plane.
+  [[nodiscard]] Verdict verdict(const Ray& ray, const On& answer,
+                                Intersector intersector = Intersector::single_precision) const {
+    return verdict(ray, hit(ray, answer), intersector);
   }
+  [[nodiscard]] Hit hit(const Ray& ray, const On& answer) const {
+    Hit hit{static_cast<float>(answer.t), 0, 0, answer.triangle};
+    if (answer.triangle >= mesh.faces.size() || degenerate(ray)) return hit;
+    const auto [u, v] = barycentrics(point(ray.origin), point(ray.direction),
+                                     *finite_corners(mesh.view(), answer.triangle));
+    if (std::isnan(u) || std::isnan(v)) return hit;
+    hit.u = static_cast<float>(u);
+    hit.v = static_cast<float>(v);
+    return hit;
+  }
+  [[nodiscard]] Verdict missed(const Ray& ray) const { return verdict(ray, Hit{}); }
 
   // Where the ray meets the plane of a triangle.
   [[nodiscard]] double t(const Ray& ray, std::size_t triangle) const {
@@ -59,8 +73,6 @@ struct Scene {
   scene::Mesh mesh;
   Oracle oracle;
 };
-
-Hit on(std::uint32_t triangle, double t) { return {static_cast<float>(t), 0, 0, triangle}; }
 
 Ray from_to(const glm::vec3& from, const glm::vec3& to) {
   Ray ray;
@@ -357,7 +369,8 @@ TEST(VerifyBand, CoplanarRays) {
   through.direction = {-1, 0.5F, 0.5F};
   ASSERT_FALSE(scene.oracle.any_hit(through));
   expect(scene.missed(through), Verdict::correct, false);
-  expect(scene.verdict(through, on(0, 2)), Verdict::phantom, true);
+  expect(scene.verdict(through, Hit{2, 0.25F, 0.25F, 0}), Verdict::phantom, true);
+  expect(scene.verdict(through, Hit{2, 0.25F, 0.26F, 0}), Verdict::phantom, false);
   expect(scene.verdict(through, on(0, 7)), Verdict::phantom, false);
   Ray past = through;
   past.direction = {-1, 1.5F, -0.5F};
@@ -470,7 +483,7 @@ TEST(VerifyCheck, CountsAndNamesTheFirst) {
   for (int i = 0; i < 5000; ++i) {
     rays.push_back(oblique({-0.2F + 1e-5F * static_cast<float>(i), 0.1F, 1}));
     const ExactHit exact = scene.oracle.closest_hit(rays.back());
-    hits.push_back(scene.rounded(rays.back(), exact));
+    hits.push_back(scene.hit(rays.back(), on(exact.ties.front(), exact.t)));
   }
   for (int i = 0; i < 12; ++i) hits[static_cast<std::size_t>(4000 - 300 * i)] = Hit{};
   rays[4500].t_max = 0.1F;

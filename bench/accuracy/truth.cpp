@@ -11,6 +11,7 @@
 #include <limits>
 #include <numeric>
 
+#include "verify/band.hpp"
 #include "verify/exact.hpp"
 
 namespace zkd::bench::accuracy {
@@ -43,8 +44,8 @@ verify::Point point(const glm::vec3& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
 }
 
-Truth::Answer answer_of(const verify::ExactHit& hit, const TriangleView& triangles,
-                        const Ray& ray) {
+Truth::Answer answer_of(const verify::Oracle& oracle, const verify::ExactHit& hit,
+                        const TriangleView& triangles, const Ray& ray) {
   if (!hit.hit)
     return {std::numeric_limits<double>::infinity(), 0.0, 0.0, 0.0, 0.0, RayClass::miss};
   const verify::Corners corners = *verify::finite_corners(triangles, hit.ties.front());
@@ -53,13 +54,12 @@ Truth::Answer answer_of(const verify::ExactHit& hit, const TriangleView& triangl
   const verify::PlaneHit plane = verify::plane_hit(o, d, corners);
   const verify::Barycentrics place = verify::barycentrics(o, d, corners);
   const double length = std::hypot(d[0], d[1], d[2]);
-  double reach = 0.0;
-  for (const verify::Point& corner : corners) {
-    for (std::size_t a = 0; a < 3; ++a) reach = std::max(reach, std::abs(corner[a] - o[a]));
-  }
-  return {hit.t,          length * (plane.normal / std::abs(plane.denominator)),
-          reach / length, place.u,
-          place.v,        class_of(hit.hit_class)};
+  return {hit.t,
+          length * (plane.normal / std::abs(plane.denominator)),
+          verify::stated_reach(oracle, ray, corners) / length,
+          place.u,
+          place.v,
+          class_of(hit.hit_class)};
 }
 
 }  // namespace
@@ -99,7 +99,7 @@ Truth::Truth(const verify::Oracle& oracle, const TriangleView& triangles, std::s
       seconds += thread_seconds() - begin;
       for (std::size_t i = block * block_size; i < end; ++i) {
         const verify::ExactHit& hit = hits[i - block * block_size];
-        answers_[i] = answer_of(hit, triangles, rays[i]);
+        answers_[i] = answer_of(oracle, hit, triangles, rays[i]);
         first_tie_[i + 1] = hit.ties.size();
         ties[block].insert(ties[block].end(), hit.ties.begin(), hit.ties.end());
       }

@@ -7,7 +7,7 @@
 // - A triangle is hit on both sides, edges and vertices included, and the hit is accepted when
 //   t_min <= t <= t_max for the t that is returned (a t below 0 that rounds to 0 is below 0).
 // - The nearest hit wins; of equally near ones, the triangle with the lowest index. Nearness is
-//   compared before t is rounded to the caller's units, which matters for far origins only.
+//   compared before t is rounded to a float of the caller's units.
 // - A ray that lies in a triangle's plane, up to the rounding of the intersector, does not hit it.
 // - A degenerate ray (see Ray) misses at once.
 // - The tree never changes an answer: closest_hit equals a loop over all triangles with the same
@@ -41,7 +41,8 @@ namespace zkd {
 /// triangle whose corners are moved by e at most along each axis, the same corner in the same way
 /// for all its edges. |t - exact t| |d| is bounded too, and how far along an axis the point that u
 /// and v name may lie from the ray's at t; rounding to floats adds half a unit in the last place of
-/// each of the three. For scenes whose coordinates are less than 2^100 apart.
+/// each of the three, and from a far origin t is off by 2^-51 of itself besides. For scenes whose
+/// largest coordinate is less than 2^100 times the smallest that is not 0.
 enum class Intersector : std::uint8_t {
   /// Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013. Single precision
   /// rejects, with an error bound; double precision decides what is left and gives t, u and v.
@@ -52,7 +53,8 @@ enum class Intersector : std::uint8_t {
 
   /// Moeller, Trumbore, JGT 1997, in single precision. Rays may slip between triangles that share
   /// an edge: the sign of an edge function is certain beyond 12 * 2^-24 times the terms that it is
-  /// summed from. The point found on the ray lies within 32 * 2^-24 R of the triangle, else double
+  /// summed from and what `watertight` may be wrong by, which decides doubtful cases. The point
+  /// found on the ray lies within 32 * 2^-24 R of the triangle, else double
   /// precision decides: t to 56 k * 2^-24 R, u and v to 32 * 2^-24 R.
   fast,
 

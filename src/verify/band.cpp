@@ -35,11 +35,9 @@ using LongPoint = std::array<Long, 3>;
 // What a t next to zero is rounded by when it is answered as a float.
 constexpr double smallest_float = 0x1p-149;
 
-// What products of two coordinates lose to underflow in single precision: 2^-148 of units in which
-// the largest coordinate is 2^-16 to 2^32 (2^-110 of its square at most), or which are 2^-127 of
-// the caller's, the smallest that a scene is scaled from.
-constexpr double lost_products = 0x1p-110;
-constexpr double least_lost = 0x1p-402;
+// What a product loses to underflow in single precision, with all that an edge function is summed
+// from: a few times half the smallest float.
+constexpr double lost_product = 0x1p-146;
 
 // An origin this many times the largest coordinate away is brought near the scene first.
 constexpr double far_origin = 8.0;
@@ -52,6 +50,20 @@ LongPoint difference(const LongPoint& a, const LongPoint& b) {
 
 Point point(const glm::vec3& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+}
+
+// Whether a ray from there is moved first.
+bool is_far(const Oracle& oracle, const Point& o) {
+  double away = 0.0;
+  for (std::size_t a = 0; a < 3; ++a)
+    away = std::max({away, oracle.box().lo[a] - o[a], o[a] - oracle.box().hi[a]});
+  return away > far_origin * oracle.largest_coordinate();
+}
+
+// TreeView::scale of a scene whose largest coordinate that is.
+double tree_scale(double largest) {
+  if (largest == 0.0 || (largest >= 0x1p-16 && largest < 0x1p32)) return 1.0;
+  return std::ldexp(1.0, std::clamp(-std::ilogb(largest), -126, 127));
 }
 
 // The float ulp at x.
@@ -85,19 +97,13 @@ struct Judged {
   Judged(const Oracle& oracle, const Ray& caller, Intersector intersector)
       : ray(caller),
         bounds(bounds_of(intersector)),
-        underflow(bounds.unit > 0x1p-50
-                      ? std::max(least_lost, lost_products * oracle.largest_coordinate() *
-                                                 oracle.largest_coordinate())
-                      : 0.0),
+        least(1.0 / tree_scale(oracle.largest_coordinate())),
         o(point(caller.origin)),
         d(point(caller.direction)),
         lost(bounds.unit == 0.0 ? 0.0 : 4.0 * oracle.lost_by_scaling()) {
-    double away = 0.0;
-    for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t a = 0; a < 3; ++a)
       if (std::abs(d[a]) > std::abs(d[z])) z = a;
-      away = std::max({away, oracle.box().lo[a] - o[a], o[a] - oracle.box().hi[a]});
-    }
-    if (away > far_origin * oracle.largest_coordinate()) {
+    if (is_far(oracle, o)) {
       mpf_class projected = many_digits(0.0);
       mpf_class squared = many_digits(0.0);
       for (std::size_t a = 0; a < 3; ++a) {
@@ -117,9 +123,19 @@ struct Judged {
     return rounded(many_digits(x) - o[axis] - *shift * d[axis]);
   }
 
+  // What t gained where the origin was moved: roundings of the shift, and of its sum with t.
+  [[nodiscard]] double lost_by_shift(double t) const { return shift ? 0x1p-51 * std::abs(t) : 0.0; }
+
   // How far s lies from the moved origin along the ray.
   [[nodiscard]] Long from_origin_along(double s) const {
     return shift ? rounded(many_digits(s) - *shift) : Long{s};
+  }
+
+  // What single precision loses of an edge function to underflow: a product of coordinates each
+  // of which is off by `least` times the smallest float, and a shear by that as well.
+  [[nodiscard]] double underflow(double a, double b) const {
+    if (bounds.unit < 0x1p-50) return 0.0;
+    return lost_product * (a * b + (a + b) * least + least * least);
   }
 
   // How far from its triangle a hit may lie: a bound along each axis is one of sqrt(3) times as
@@ -130,7 +146,7 @@ struct Judged {
 
   const Ray& ray;
   Bounds bounds;
-  double underflow;
+  double least;  // 1 of tree space in the caller's units
   Point o;
   Point d;
   std::size_t z = 0;               // the axis along which d is longest
@@ -217,7 +233,7 @@ Facts examine(const Judged& judged, const Corners& corners) {
     // `fast` decides in either precision, and neither bound is always the larger: that of double
     // is, where a triangle lies nearly along an axis and so has small terms.
     if (bounds.product != 0.0) band = std::max(band, product_error[i]);
-    band += judged.underflow;
+    band += judged.underflow(a.size[0] + a.size[1] + a.size[2], b.size[0] + b.size[1] + b.size[2]);
     // Where no coordinate is rounded there is no excuse.
     const bool flat = bounds.product == 0.0 && a.at[0] == 0.0 && b.at[0] == 0.0 &&
                       a.moved[0] == 0.0 && b.moved[0] == 0.0;
@@ -232,10 +248,12 @@ Facts examine(const Judged& judged, const Corners& corners) {
   // to the triangle that is allowed.
   facts.t_allowance =
       (bounds.product == 0.0
-           ? (moved[0] + moved[1]) * plane.normal / std::abs(plane.denominator) +
+           ? std::hypot(moved[0], moved[1]) * plane.normal / std::abs(plane.denominator) +
                  bounds.unit * bounds.t * furthest / depth
            : judged.distance(facts.reach) * plane.normal / std::abs(plane.denominator)) +
-      (bounds.unit == 0.0 ? 0.0 : 0x1p-51 * std::abs(plane.t) + smallest_float);
+      (bounds.unit == 0.0
+           ? 0.0
+           : 0x1p-52 * std::abs(plane.t) + judged.lost_by_shift(plane.t) + smallest_float);
   return facts;
 }
 
@@ -293,8 +311,9 @@ Long distance_of_answer(const Judged& judged, double t, const Corners& corners) 
     return distance({along * judged.d[0], along * judged.d[1], along * judged.d[2]}, seen);
   };
   const Long answered = judged.from_origin_along(t);
-  Long lo = answered - 0.5L * Long{float_ulp(t)};
-  Long hi = answered + 0.5L * Long{float_ulp(t)};
+  const Long rounded_by = Long{0.5 * float_ulp(t) + judged.lost_by_shift(t)};
+  Long lo = answered - rounded_by;
+  Long hi = answered + rounded_by;
   for (int i = 0; i < 1000 && lo < hi; ++i) {
     const Long third = (hi - lo) / 3.0L;
     if (at(lo + third) <= at(hi - third))
@@ -342,17 +361,15 @@ bool is_point_in_bound(const Judged& judged, const Hit& hit, const Corners& corn
   const Long along = judged.from_origin_along(t);
   const LongPoint ab = difference(seen[1], seen[0]);
   const LongPoint ac = difference(seen[2], seen[0]);
-  // What a Long, which may be no more than a double, loses here.
-  const double computed = 0x1p-51 * reach;
+  const double computed = 8.0 * static_cast<double>(std::numeric_limits<Long>::epsilon()) * reach;
   const double promised = judged.bounds.unit * judged.bounds.point * reach + judged.lost + computed;
   for (std::size_t a = 0; a < 3; ++a) {
     const double off = static_cast<double>(
         std::abs(seen[0][a] + Long{u} * ab[a] + Long{v} * ac[a] - along * Long{judged.d[a]}));
-    // Half a unit of each, and what t gained where the origin was moved.
-    const double rounded = 0.5 * (float_ulp(t) * std::abs(judged.d[a]) +
-                                  float_ulp(u) * static_cast<double>(std::abs(ab[a])) +
-                                  float_ulp(v) * static_cast<double>(std::abs(ac[a]))) +
-                           0x1p-51 * std::abs(t * judged.d[a]);
+    // Half a unit of each.
+    const double rounded = (0.5 * float_ulp(t) + judged.lost_by_shift(t)) * std::abs(judged.d[a]) +
+                           0.5 * (float_ulp(u) * static_cast<double>(std::abs(ab[a])) +
+                                  float_ulp(v) * static_cast<double>(std::abs(ac[a])));
     if (!(off <= promised + rounded)) return false;
   }
   return true;
@@ -370,12 +387,7 @@ Bounds bounds_of(Intersector intersector) noexcept {
       return {
           .unit = 0x1p-24, .corner = 4.0, .sheared = 5.0, .hit = 24.0, .t = 15.0, .point = 38.0};
     case Intersector::fast:
-      return {.unit = 0x1p-24,
-              .corner = 4.0,
-              .sheared = 5.0,
-              .hit = 32.0,
-              .point = 32.0,
-              .product = 12.0};
+      return {.unit = 0x1p-24, .hit = 32.0, .point = 32.0, .product = 12.0};
     case Intersector::exact:
       break;
   }
@@ -409,6 +421,15 @@ const char* to_string(Verdict::Kind kind) noexcept {
       return "wrong triangle";
   }
   return "?";
+}
+
+double stated_reach(const Oracle& oracle, const Ray& ray, const Corners& corners) {
+  const Point o = point(ray.origin);
+  if (is_far(oracle, o)) return 32.0 * oracle.largest_coordinate();
+  double reach = 0.0;
+  for (const Point& corner : corners)
+    for (std::size_t a = 0; a < 3; ++a) reach = std::max(reach, std::abs(corner[a] - o[a]));
+  return reach;
 }
 
 bool point_in_bound(const Oracle& oracle, const TriangleView& triangles, const Ray& ray,
@@ -459,11 +480,14 @@ Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ra
   double allowance = 0.0;
   if (answered) {
     const Facts facts = examined(judged, hit.triangle);
+    const Corners corners = *finite_corners(triangles, hit.triangle);
+    if (!is_point_in_bound(judged, hit, corners)) return verdict;
     if (std::binary_search(hits.begin(), hits.end(), hit.triangle)) {
       chosen = facts.t;
       allowance = facts.t_allowance;
+      const double off = std::abs(static_cast<double>(hit.t) - chosen);
+      if (!(off <= allowance + 0.5 * float_ulp(chosen))) return verdict;
     } else {
-      const Corners corners = *finite_corners(triangles, hit.triangle);
       if (!may_be_invented(judged, facts, hit, corners)) return verdict;
       // Its plane may be nearly along the ray and say nothing of t: the t answered counts.
       chosen = static_cast<double>(hit.t);

@@ -29,8 +29,8 @@ namespace zkd::verify {
 /// the distance to the triangle leaves.
 struct Bounds {
   double unit;
-  double corner;
-  double sheared;
+  double corner = 0.0;
+  double sheared = 0.0;
   double hit;
   double t = 0.0;
   double point;
@@ -65,6 +65,9 @@ struct Verdict {
 
 /// "correct", ... Static storage.
 const char* to_string(Verdict::Kind kind) noexcept;
+
+/// R of zkd/query.hpp, for a triangle of the oracle.
+[[nodiscard]] double stated_reach(const Oracle& oracle, const Ray& ray, const Corners& corners);
 
 /// Verdict::point_in_bound, of a hit on a valid triangle.
 [[nodiscard]] bool point_in_bound(const Oracle& oracle, const TriangleView& triangles,

@@ -16,8 +16,8 @@
 namespace zkd::core {
 
 /// Sums of products below this, or t divided by them, may lose digits to underflow: double
-/// precision is asked. A sum is at most the square of the reach, so that here the reach is above
-/// 2^-40, and what t loses, 2^-149 over the sum, below 2^-29 of that.
+/// precision is asked. A sum is at most 24 times the square of the reach, so that here the reach is
+/// above 2^-43, and what t loses, four times 2^-150 over the sum, below 2^-25 of that.
 inline constexpr float smallest_sum = 8.2718061e-25F;  // 2^-80
 
 /// Intersector::single_precision: Woop, Benthin, Wald 2013, with Kahan's difference of products in
