@@ -175,9 +175,10 @@ TEST_F(AccuracyCli, EverySettingIsAPointOfTheCurves) {
     }
     if (point["family"] == "literal") literal_errs = literal_errs || point["error"] > 0.0;
   }
-  for (const char* wanted : {"watertight", "once", "all", "codes 32", "codes 64", "bits 5",
-                             "bits 21", "leaf 1", "leaf 32", "naive once", "padded once",
-                             "slab once", "naive all", "padded all", "slab all", "literal"}) {
+  for (const char* wanted :
+       {"watertight", "once", "all", "codes 32", "codes 64", "bits 5", "bits 21", "leaf 1",
+        "leaf 32", "naive once", "padded once", "slab once", "naive all", "padded all", "slab all",
+        "literal", "wide watertight", "wide exact", "wide balanced"}) {
     EXPECT_TRUE(settings.contains(wanted)) << wanted;
   }
   EXPECT_TRUE(literal_errs);  // triangles that straddle planes are lost, in some scene

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <zkd/build.hpp>
+#include <zkd/cpu/wide_tree.hpp>
 
 #include "contender.hpp"
 #include "cuda.hpp"
@@ -29,17 +30,24 @@ class ZkdRunner final : public Runner {
     clear();
     const Stopwatch watch;
     tree_ = zkd::build(executor_, triangles_, setting_.build);
+    if (setting_.wide) wide_ = cpu::widen(executor_, tree_.view(), triangles_);
     return watch.ms();
   }
 
   double closest_hit(std::span<const Ray> rays, std::span<Hit> hits) override {
     const Stopwatch watch;
-    accuracy::closest_hit(setting_.walk, setting_.intersector, executor_, tree_.view(), triangles_,
-                          rays, hits);
+    if (setting_.wide)
+      cpu::closest_hit(executor_, wide_.view(), rays, hits, {}, setting_.intersector);
+    else
+      accuracy::closest_hit(setting_.walk, setting_.intersector, executor_, tree_.view(),
+                            triangles_, rays, hits);
     return watch.ms();
   }
 
-  void clear() override { tree_ = Tree(); }
+  void clear() override {
+    tree_ = Tree();
+    wide_ = cpu::WideTree();
+  }
 
   [[nodiscard]] double references_per_triangle() const override {
     return accuracy::references_per_triangle(tree_.view(), triangles_);
@@ -50,6 +58,7 @@ class ZkdRunner final : public Runner {
   TriangleView triangles_;
   cpu::Executor executor_;
   Tree tree_;
+  cpu::WideTree wide_;  ///< where the setting is wide
 };
 
 // The device keeps a tree, its workspace and a copy of the triangles only from build() to clear():

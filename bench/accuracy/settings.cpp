@@ -11,11 +11,13 @@ namespace zkd::bench::accuracy {
 
 namespace {
 
-// What a device has too: it knows neither other walks than the library's nor the exact intersector.
+// What a device has too: it knows neither other walks than the library's, nor wide trees, nor the
+// exact intersector.
 void add_cuda(std::vector<Setting>& settings) {
   const std::vector<Setting> of_cpu = settings;
   for (Setting setting : of_cpu) {
-    if (setting.walk != Walk::library || setting.intersector == Intersector::exact) continue;
+    if (setting.walk != Walk::library || setting.wide || setting.intersector == Intersector::exact)
+      continue;
     setting.family = "cuda " + setting.family;
     setting.name = "cuda " + setting.name;
     setting.cuda = true;
@@ -32,11 +34,19 @@ std::vector<Setting> all_settings(bool cuda) {
   const auto add = [&](const char* family, const std::string& name, const BuildOptions& build,
                        Walk walk = Walk::library,
                        Intersector intersector = Intersector::watertight) {
-    settings.push_back({family, name, build, walk, intersector, false});
+    settings.push_back({family, name, build, walk, intersector});
+  };
+  const auto add_wide = [&](const std::string& name, const BuildOptions& build,
+                            Intersector intersector) {
+    settings.push_back({"wide", "wide " + name, build, Walk::library, intersector});
+    settings.back().wide = true;
   };
 
   for (const Intersector intersector : all_intersectors) {
     add("intersector", zkd::to_string(intersector), base, Walk::library, intersector);
+  }
+  for (const Intersector intersector : all_intersectors) {
+    add_wide(zkd::to_string(intersector), base, intersector);
   }
   for (const References references :
        {References::once, References::budget, References::automatic, References::all}) {
@@ -49,6 +59,7 @@ std::vector<Setting> all_settings(bool cuda) {
     build.quality = Quality::balanced;
     build.references = References::automatic;
     add("references", "balanced", build);
+    add_wide("balanced", build, Intersector::watertight);
   }
   for (const std::uint32_t bits : {32u, 64u}) {
     BuildOptions build = base;

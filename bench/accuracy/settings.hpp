@@ -23,6 +23,7 @@ struct Setting {
   Walk walk = Walk::library;
   Intersector intersector = Intersector::watertight;  ///< of the library's walk
   bool cuda = false;                                  ///< on the device; the library's walk only
+  bool wide = false;                                  ///< through cpu::WideTree; likewise
 };
 
 /// All of them, one family after another; the first is default_setting. With `cuda`, those that a
