@@ -17,8 +17,11 @@ constexpr const char* end_marker = "<!-- table: end -->";
 
 // What a reader looks for even where something beats it.
 bool is_landmark(const Point& point) {
-  return point.peer || point.setting == default_setting ||
-         point.setting == std::string("cuda ") + default_setting || point.family == "literal";
+  const auto is_default = [&](const char* through) {
+    return point.setting == std::string(through) + default_setting;
+  };
+  return point.peer || is_default("") || is_default("wide ") || is_default("cuda ") ||
+         point.family == "literal";
 }
 
 std::string with(const char* format, double value) {
