@@ -176,7 +176,7 @@ INSTANTIATE_TEST_SUITE_P(
                     [] { return scene::joined(scene::soup(30000, 42), scene::identical(30000)); }},
         LargerScene{
             "Stairs",
-            [] { return scene::joined(scene::staircase(300), scene::same_centre(20000, 43)); }}),
+            [] { return scene::joined(scene::staircase(300), scene::same_centre(8000, 43)); }}),
     [](const auto& one) { return std::string(one.param.name); });
 
 TEST(CudaSameTree, ForAThousandTriangles) {
