@@ -496,9 +496,13 @@ Verdict judge(const Oracle& oracle, const TriangleView& triangles, const Ray& ra
   }
 
   // Nothing that had to be found may be nearer.
+  std::optional<Corners> last;
   for (const std::uint32_t other : hits) {
     if (other == hit.triangle) continue;
-    const Facts facts = examined(judged, other);
+    const Corners corners = *finite_corners(triangles, other);
+    if (corners == last) continue;  // a million copies of one are judged as one
+    last = corners;
+    const Facts facts = examine(judged, corners);
     if (chosen - facts.t <= allowance + facts.t_allowance) continue;
     if (!may_be_missed(facts, ray)) return verdict;
   }
