@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <ostream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -146,6 +147,8 @@ TEST(CudaSameTree, ForManySeeds) {
 struct LargerScene {
   const char* name;
   scene::Mesh (*mesh)();
+
+  friend void PrintTo(const LargerScene& one, std::ostream* out) { *out << one.name; }
 };
 
 // Each a test of its own: the simulation takes its time.
