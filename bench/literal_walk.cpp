@@ -4,7 +4,6 @@
 // library's too.
 #include "literal_walk.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <vector>
 

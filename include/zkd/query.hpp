@@ -54,8 +54,8 @@ enum class Intersector : std::uint8_t {
   /// Moeller, Trumbore, JGT 1997, in single precision. Rays may slip between triangles that share
   /// an edge: the sign of an edge function is certain beyond 12 * 2^-24 times the terms that it is
   /// summed from and what `watertight` may be wrong by, which decides doubtful cases. The point
-  /// found on the ray lies within 32 * 2^-24 R of the triangle, else double
-  /// precision decides: t to 56 k * 2^-24 R, u and v to 32 * 2^-24 R.
+  /// found on the ray lies within 32 * 2^-24 R of the triangle, else double precision decides: t
+  /// to 56 k * 2^-24 R, u and v to 32 * 2^-24 R.
   fast,
 
   /// Woop, Benthin, Wald in single precision, with Kahan's difference of products: for devices on
