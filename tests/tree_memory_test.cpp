@@ -185,6 +185,24 @@ TEST(TreeMemory, RequirementGrowsWithTheCount) {
   EXPECT_NO_THROW((void)memory_requirement({}, max_count));
 }
 
+// Found by fuzzing: room for a budget that no cuts could use was asked for.
+TEST(TreeMemory, ABudgetTakesNoMoreThanCutsCanUse) {
+  const scene::Mesh soup = scene::soup(100, 41);
+  for (const References references : {References::budget, References::automatic}) {
+    BuildOptions useful = options_for(references);
+    useful.budget = 1024.0F;
+    BuildOptions boundless = useful;
+    boundless.budget = 1e30F;
+    const cpu::Executor executor{.threads = 2};
+    const MemoryRequirement need = memory_requirement(executor, soup.faces.size(), useful);
+    const MemoryRequirement more = memory_requirement(executor, soup.faces.size(), boundless);
+    EXPECT_EQ(more.tree_bytes, need.tree_bytes);
+    EXPECT_EQ(more.workspace_bytes, need.workspace_bytes);
+    EXPECT_EQ(tree_hash(build(executor, soup.view(), boundless).view()),
+              tree_hash(build(executor, soup.view(), useful).view()));
+  }
+}
+
 // ---- Refusals -----------------------------------------------------------------------------------
 
 // Refuses allocation 1, 2, 3, ..., alone and with all that follow, until `work` succeeds.

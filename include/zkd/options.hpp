@@ -119,7 +119,8 @@ struct BuildOptions {
 
   /// References per valid triangle that `budget` may use, counted over the whole scene and never
   /// exceeded; finite, at least 1. 1.3 took a third off the node visits and half off the triangle
-  /// tests in Conference; twice as much gained little more. A device makes room for as many.
+  /// tests in Conference; twice as much gained little more. No triangle gets more than 1024. Room is
+  /// made for as many before the scene is known.
   float budget = 1.3F;
 
   /// References that a CUDA build of `all` makes room for, at most max_count: there memory is taken

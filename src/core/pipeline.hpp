@@ -167,7 +167,7 @@ inline bool may_split(const BuildOptions& options) {
 
 /// What is coded and sorted: triangles, or at most so many fragments of them.
 inline std::uint32_t most_elements(const BuildOptions& options, std::uint32_t triangles) {
-  return may_split(options) ? budget_of(options.budget, triangles) : triangles;
+  return may_split(options) ? most_fragments(options.budget, triangles) : triangles;
 }
 
 /// One build. `Code` only has to hold the bits of the lattice: it does not change the tree.

@@ -98,6 +98,13 @@ struct PriorityClasses {
 /// Cuts of one triangle at most: it is cut by one thread.
 inline constexpr std::uint32_t most_cuts = 1023;
 
+/// Fragments that are made at most: all that a budget allows, or all that cuts can make.
+ZKD_HOST_DEVICE inline std::uint32_t most_fragments(float factor, std::uint32_t triangles) {
+  const std::uint64_t cut = std::uint64_t{triangles} * (most_cuts + 1);
+  const std::uint32_t allowed = budget_of(factor, triangles);
+  return cut < allowed ? static_cast<std::uint32_t>(cut) : allowed;
+}
+
 /// Cuts for each unit of weight, coarsely: 2^(step / 2).
 struct Densities {
   static constexpr std::uint32_t coarse = 64;

@@ -360,7 +360,9 @@ class Device {
       std::uintptr_t word = 0;
       std::memcpy(&word, bytes + at, sizeof word);
       constexpr std::uintptr_t page = 4096;
-      if (word < 16 * page) continue;
+      // GCC 12 leaves the padding behind an array of structures: half an old address may still
+      // stand above a number.
+      if (static_cast<std::uint32_t>(word) < 16 * page) continue;
       auto* const address = reinterpret_cast<void*>(word / page * page);
       if (is_host_memory(address) && msync(address, 1, MS_ASYNC) == 0) return true;
     }
