@@ -241,6 +241,7 @@ void expect_every_refusal_is_survived(const Work& work) {
 
 TEST(TreeMemory, EveryRefusalIsOneErrorAndNoLeak) {
   for (const test::NamedMesh& m : meshes()) {
+    if (m.mesh.faces.size() > 10000) continue;  // takes its memory as one of 5000 does
     for (const BuildOptions& way : ways()) {
       // Takes memory on every level, hundreds of times: below.
       if (way.builder == Builder::wu2011) continue;

@@ -155,7 +155,7 @@ TEST(WideTree, OfNothingMissesEverything) {
 
 // A leaf that nothing can divide is a row of blocks: alone, and below nodes.
 TEST(WideTree, HugeLeaves) {
-  const scene::Mesh pile = scene::identical(100'000);
+  const scene::Mesh pile = scene::identical(20'000);
   for (const scene::Mesh& mesh : {pile, scene::joined(scene::soup(500, 5), pile)}) {
     const Tree tree = build(mesh.view(), options_for(References::once));
     const WideTree wide = cpu::widen({.threads = 2}, tree.view(), mesh.view());
