@@ -165,7 +165,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
     app.add_option(name, value, help)->group(build)->type_name("F")->capture_default_str();
   };
   fraction("--budget", budget, "References per triangle at most, for `budget`");
-  number(build, "--leaf-size", leaf_size, "Triangles in a leaf at most", 1, 1024);
+  number(build, "--leaf-size", leaf_size, "Triangles in a leaf at most; 0: 4, for `all` 8", 0,
+         1024);
   number(build, "--code-bits", code_bits, "Bits of a Morton code; 0: by triangle count", 0, 64);
   text(build, "--axis-order", axis_order,
        "Order of the axes in a code: " + names_of(all_axis_orders, ", "), "ORDER");

@@ -88,7 +88,7 @@ TEST_F(BenchCli, BadUsageIsOneLineThatNamesTheOption) {
     expect_error(std::string("tetra.obj ") + option + " x", 2, option);
     expect_error(std::string("tetra.obj ") + option, 2, option);
   }
-  expect_error("tetra.obj --leaf-size 0", 2, "--leaf-size");
+  expect_error("tetra.obj --leaf-size 1025", 2, "--leaf-size");
   expect_error("tetra.obj --code-bits 65", 2, "--code-bits");
   expect_error("tetra.obj --reference-capacity 2147483648", 2, "--reference-capacity");
   expect_error("--cold", 2, "--cold");

@@ -201,7 +201,7 @@ TEST(CudaError, AnalysedOptionsAreOptions) {
 TEST(CudaError, OptionsAndViewsAsOnTheCpu) {
   const scene::Mesh mesh = scene::soup(100, 98);
   std::vector<BuildOptions> wrong(8);
-  wrong[0].leaf_size = 0;
+  wrong[0].quality = static_cast<Quality>(99);
   wrong[1].leaf_size = 1025;
   wrong[2].code_bits = 65;
   wrong[3].axis_order = static_cast<AxisOrder>(99);

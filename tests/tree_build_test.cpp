@@ -335,8 +335,11 @@ TEST(TreeBuild, SkipsAreLookedForWhereTheyCanBe) {
 }
 
 TEST(TreeBuild, OptionsAreRecordedAsChosen) {
-  const Tree tree = test::build(scene::soup(100, 10).view(), {.leaf_size = 7});
+  const scene::Mesh soup = scene::soup(100, 10);
+  const Tree tree = test::build(soup.view(), {.leaf_size = 7});
   EXPECT_EQ(tree.options().leaf_size, 7u);
+  EXPECT_EQ(test::build(soup.view()).options().leaf_size, 4u);
+  EXPECT_EQ(test::build(soup.view(), {.references = References::all}).options().leaf_size, 8u);
   EXPECT_EQ(tree.options().backend, test::backend());
   EXPECT_EQ(tree.options().code_bits, 32u);
 }

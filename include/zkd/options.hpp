@@ -107,9 +107,9 @@ struct BuildOptions {
   Builder builder = Builder::morton;
   SahOptions sah{};  ///< for Builder::sah and wu2011
 
-  /// `balanced` takes a part of the node visits of `fast` off primary rays (Bunny 15 of 100, Sibenik
-  /// 26, Conference 41) for 1.2 to 2.6 times the time to build. Codes then have 46 to 51 bits at
-  /// most. With References::all it is no gain.
+  /// `balanced` takes a part of the node visits of `fast` off primary rays (Bunny 15 of 100,
+  /// Sibenik 26, Conference 41) for 1.2 to 2.6 times the time to build. Codes then have 46 to 51
+  /// bits at most. With References::all it is no gain.
   Quality quality = Quality::fast;
 
   /// `once` takes about a tenth of the time to build that `all` takes and two thirds of the memory
@@ -119,8 +119,8 @@ struct BuildOptions {
 
   /// References per valid triangle that `budget` may use, counted over the whole scene and never
   /// exceeded; finite, at least 1. 1.3 took a third off the node visits and half off the triangle
-  /// tests in Conference; twice as much gained little more. No triangle gets more than 1024. Room is
-  /// made for as many before the scene is known.
+  /// tests in Conference; twice as much gained little more. No triangle gets more than 1024. Room
+  /// is made for as many before the scene is known.
   float budget = 1.3F;
 
   /// References that a CUDA build of `all` makes room for, at most max_count: there memory is taken
@@ -131,10 +131,13 @@ struct BuildOptions {
   std::uint64_t reference_capacity = 0;
 
   /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
-  /// 1024. With `all` a leaf that lists more than four times as many is split again, by what lies
-  /// in its cell, into trunks of twice as many. Of 1, 2, 4 and 8, 4 was within 3 % of the best for
-  /// build plus trace on Bunny and the best on Sibenik. Time of the trunk stage grows with it.
-  std::uint32_t leaf_size = 4;
+  /// 1024, or 0: 4, with `all` 8. With `all` a leaf that lists more than four times as many is
+  /// split again, by what lies in its cell, into trunks of twice as many. Of 1, 2, 4 and 8, 4 was
+  /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; `all` is
+  /// built 1.4 to 1.8 times as fast with 8 as with 4 in a little over half the memory, and traced
+  /// as fast as a wide tree, a tenth slower as a binary one (Bunny, Sibenik, Conference). Time of
+  /// the trunk stage grows with it.
+  std::uint32_t leaf_size = 0;
 
   /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. With 32
   /// bits rays visit as many nodes as with 63, within 1 % (Bunny, Conference, Dragon), and the sort

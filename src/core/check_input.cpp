@@ -41,9 +41,10 @@ void check_ranges(const BuildOptions& options) {
   check(options.invalid_triangles, InvalidTriangles::skip, "invalid_triangles");
   check(options.axis_order, AxisOrder::cyclic, "axis_order");
   check(options.backend, Backend::cuda, "backend");
-  if (options.leaf_size < 1 || options.leaf_size > 1024)
+  if (options.leaf_size > 1024)
     fail(ErrorCode::invalid_option, options.leaf_size,
-         "leaf_size is " + std::to_string(options.leaf_size) + "; it must be 1 to 1024");
+         "leaf_size is " + std::to_string(options.leaf_size) +
+             "; it must be 1 to 1024, or 0 for automatic");
   if (options.code_bits > 64)
     fail(ErrorCode::invalid_option, options.code_bits,
          "code_bits is " + std::to_string(options.code_bits) +

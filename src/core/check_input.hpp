@@ -23,6 +23,14 @@ ZKD_API void check_count(std::uint64_t triangle_count);
                                                                                 : options.builder;
 }
 
+/// The options with what was left to zkd filled in, as far as the scene does not matter.
+[[nodiscard]] constexpr BuildOptions settled(const BuildOptions& options) {
+  BuildOptions all = options;
+  all.builder = builder_for(options);
+  if (all.leaf_size == 0) all.leaf_size = options.references == References::all ? 8 : 4;
+  return all;
+}
+
 /// For the builders that run over the verbs, on any backend. Throws Error invalid_option or
 /// unsupported_option.
 ZKD_API void check_options(const BuildOptions& options);

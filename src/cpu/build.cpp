@@ -61,8 +61,7 @@ Tree build(const cpu::Executor& executor, const TriangleView& triangles,
   core::check_cpu_options(options);
   core::check_view(triangles);
   cpu::check_executor(executor);
-  BuildOptions used = options;
-  used.builder = core::builder_for(options);
+  const BuildOptions used = core::settled(options);
   Tree tree = used.builder == Builder::sah ? cpu::sah::build(executor, triangles, used)
                                            : build_by_passes(executor, triangles, used);
   Statistics& statistics = TreeAssembler::statistics(tree);
@@ -95,7 +94,8 @@ MemoryRequirement memory_requirement(const cpu::Executor& executor, std::uint64_
   core::check_predictable(options);
   core::check_count(triangle_count);
   return cpu::Backend::requirement(
-      executor, triangle_count, options, core::needs_wide_codes(options, triangle_count),
+      executor, triangle_count, core::settled(options),
+      core::needs_wide_codes(options, triangle_count),
       options.references == References::all
           ? reference_count
           : core::most_elements(options, static_cast<std::uint32_t>(triangle_count)));

@@ -201,14 +201,16 @@ MemoryRequirement requirement(Device& device, std::uint64_t triangle_count,
   check_reference_capacity(options);
   TriangleView triangles;
   triangles.triangle_count = triangle_count;
-  const Plan plan = plan_build(device, triangles, options, capacity_for(triangle_count, options));
+  const Plan plan =
+      plan_build(device, triangles, core::settled(options), capacity_for(triangle_count, options));
   return {plan.tree_bytes, plan.workspace_bytes};
 }
 
 /// build() for Builder::wu2011, level by level: waits for the device, and throws what goes wrong.
 template <class Device>
-Tree build_by_levels(Device& device, const TriangleView& triangles, const BuildOptions& options) {
-  core::check_options(options);
+Tree build_by_levels(Device& device, const TriangleView& triangles, const BuildOptions& asked) {
+  core::check_options(asked);
+  const BuildOptions options = core::settled(asked);
   core::check_view(triangles);
   TriangleUpload<Device> upload(device, triangles);
   DeviceBlock triangle_block(device.memory(), device.stream(), upload.bytes());
@@ -239,8 +241,9 @@ Tree build_by_levels(Device& device, const TriangleView& triangles, const BuildO
 /// build() without the check that `all` has room for references: analyse() asks for none.
 template <class Device>
 Tree build_with(Device& device, const Executor& executor, const TriangleView& triangles,
-                const BuildOptions& options) {
-  core::check_options(options);
+                const BuildOptions& asked) {
+  core::check_options(asked);
+  const BuildOptions options = core::settled(asked);
   core::check_view(triangles);
   const Capacity capacity = capacity_for(triangles.triangle_count, options);
   const Plan plan = plan_build(device, triangles, options, capacity);
@@ -313,8 +316,9 @@ void rebuild_on(Device& device, const Executor& executor, Tree& tree,
 /// See zkd::analyse.
 template <class Device>
 BuildOptions analyse_on(Device& device, const Executor& executor, const TriangleView& triangles,
-                        const BuildOptions& options) {
-  core::check_options(options);
+                        const BuildOptions& asked) {
+  core::check_options(asked);
+  const BuildOptions options = core::settled(asked);
   BuildOptions found = options;
   if (options.builder == Builder::wu2011) {  // makes room as it goes
     core::check_view(triangles);

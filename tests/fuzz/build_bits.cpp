@@ -32,9 +32,9 @@ bool in_range(const BuildOptions& options) {
   return known(options.builder, Builder::wu2011) && known(options.quality, Quality::high) &&
          known(options.references, References::automatic) &&
          known(options.invalid_triangles, InvalidTriangles::skip) &&
-         known(options.axis_order, AxisOrder::cyclic) && options.leaf_size >= 1 &&
-         options.leaf_size <= 1024 && options.code_bits <= 64 && std::isfinite(options.budget) &&
-         options.budget >= 1.0F && options.reference_capacity <= max_count;
+         known(options.axis_order, AxisOrder::cyclic) && options.leaf_size <= 1024 &&
+         options.code_bits <= 64 && std::isfinite(options.budget) && options.budget >= 1.0F &&
+         options.reference_capacity <= max_count;
 }
 
 // The first triangle that may not be there: a wrong index comes before what is not finite.

@@ -50,6 +50,8 @@ inline Composition compose(const Executor& executor, const TriangleView& triangl
   const stages::SceneSummary scene =
       stages::triangle_boxes(executor, uploaded, options.invalid_triangles, boxes);
   out.bounds = scene.bounds;
+  std::uint32_t leaf_size = options.leaf_size;
+  if (leaf_size == 0) leaf_size = options.references == References::all ? 8 : 4;
   std::uint32_t width = options.code_bits;
   if (width == 0) width = scene.valid < (1u << 22) ? 32 : 64;
   out.lattice = stages::make_lattice(scene.bounds, width, options.axis_order);
@@ -63,10 +65,10 @@ inline Composition compose(const Executor& executor, const TriangleView& triangl
   Array<std::uint32_t> crowd(scene.valid);
   Array<Lattice> lattices(scene.valid);
   out.crowded =
-      stages::recode_crowded(executor, boxes, out.lattice, codes, ids, options.leaf_size,
+      stages::recode_crowded(executor, boxes, out.lattice, codes, ids, leaf_size,
                              options.axis_order, options.recode_crowded, keys, crowd, lattices);
   Array<std::uint32_t> found(scene.valid);
-  const std::uint32_t trunks = stages::find_trunks(executor, keys, options.leaf_size, found);
+  const std::uint32_t trunks = stages::find_trunks(executor, keys, leaf_size, found);
   out.first = found.download();
   out.first.resize(trunks);
 
@@ -105,7 +107,7 @@ inline Composition compose(const Executor& executor, const TriangleView& triangl
   }
   const auto split = [&](const stages::StrictArrays& arrays) {
     return stages::split_crowded_leaves(executor, uploaded, boxes, trunk_keys, skeleton,
-                                        leaf_offsets, references, inside, options.leaf_size,
+                                        leaf_offsets, references, inside, leaf_size,
                                         options.axis_order, arrays);
   };
   const stages::SplitLeaves strict = split({});

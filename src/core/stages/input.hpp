@@ -49,6 +49,8 @@ struct IsNotBelow {
 };
 
 inline void check_leaf_size(std::uint32_t leaf_size) {
+  if (leaf_size == 0)
+    throw Error(ErrorCode::invalid_option, 0, "leaf_size is 0; it must be 1 to 1024");
   BuildOptions options;
   options.leaf_size = leaf_size;
   check_options(options);
