@@ -174,6 +174,8 @@ Json json_of(const Result& result) {
       {"code_bits", statistics.code_bits},
       {"crowded_trunks", statistics.crowded_trunks},
       {"crowded_triangles", statistics.crowded_triangles},
+      {"crowded_leaves", statistics.crowded_leaves},
+      {"crowded_references", statistics.crowded_references},
       {"hash", result.tree_hash}};
   if (result.tree_statistics) json["tree"]["statistics"] = tree_stats_json(*result.tree_statistics);
   json["trace"] = json_of(result.traces);

@@ -20,6 +20,7 @@ const char* unit_of(Skip skip) {
     case Skip::splitting:
     case Skip::recoding:
     case Skip::compaction:
+    case Skip::subtrees:
     case Skip::count:
       break;
   }

@@ -46,13 +46,15 @@ void expect_same_statistics(const Statistics& device, const Statistics& host) {
   EXPECT_EQ(device.code_bits, host.code_bits);
   EXPECT_EQ(device.crowded_trunks, host.crowded_trunks);
   EXPECT_EQ(device.crowded_triangles, host.crowded_triangles);
+  EXPECT_EQ(device.crowded_leaves, host.crowded_leaves);
+  EXPECT_EQ(device.crowded_references, host.crowded_references);
   EXPECT_EQ(device.nodes, host.nodes);
   EXPECT_EQ(device.leaves, host.leaves);
   EXPECT_EQ(device.references, host.references);
   EXPECT_EQ(device.largest_leaf, host.largest_leaf);
   EXPECT_EQ(device.depth, host.depth);
   EXPECT_EQ(device.sah_cost, host.sah_cost);
-  for (const Skip skip : {Skip::flat_axes, Skip::recoding, Skip::compaction}) {
+  for (const Skip skip : {Skip::flat_axes, Skip::recoding, Skip::compaction, Skip::subtrees}) {
     EXPECT_EQ(device.skip(skip).taken, host.skip(skip).taken) << to_string(skip);
     EXPECT_EQ(device.skip(skip).amount, host.skip(skip).amount) << to_string(skip);
   }

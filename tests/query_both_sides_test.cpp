@@ -116,6 +116,8 @@ TEST(QueryBothSides, KnowTheSameOfATree) {
       EXPECT_EQ(got.code_bits, want.code_bits);
       EXPECT_EQ(got.crowded_trunks, want.crowded_trunks);
       EXPECT_EQ(got.crowded_triangles, want.crowded_triangles);
+      EXPECT_EQ(got.crowded_leaves, want.crowded_leaves);
+      EXPECT_EQ(got.crowded_references, want.crowded_references);
       EXPECT_EQ(got.nodes, want.nodes);
       EXPECT_EQ(got.leaves, want.leaves);
       EXPECT_EQ(got.references, want.references);
@@ -123,7 +125,7 @@ TEST(QueryBothSides, KnowTheSameOfATree) {
       EXPECT_EQ(got.depth, want.depth);
       EXPECT_EQ(got.sah_cost, want.sah_cost);
       for (const Skip skip :
-           {Skip::flat_axes, Skip::wide_codes, Skip::recoding, Skip::compaction}) {
+           {Skip::flat_axes, Skip::wide_codes, Skip::recoding, Skip::compaction, Skip::subtrees}) {
         EXPECT_EQ(got.skip(skip).taken, want.skip(skip).taken) << to_string(skip);
         EXPECT_EQ(got.skip(skip).amount, want.skip(skip).amount) << to_string(skip);
       }

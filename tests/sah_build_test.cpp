@@ -16,6 +16,7 @@
 #include "support/hits.hpp"
 #include "support/meshes.hpp"
 #include "support/sah_brute_force.hpp"
+#include "support/sah_cases.hpp"
 #include "verify/properties.hpp"
 #include "verify/tree_hash.hpp"
 
@@ -25,21 +26,7 @@ namespace {
 using verify::tree_hash;
 
 BuildOptions options_for(const SahOptions& sah = {}) {
-  BuildOptions options;
-  options.builder = Builder::sah;
-  options.sah = sah;
-  options.invalid_triangles = InvalidTriangles::skip;
-  options.measure_quality = true;
-  return options;
-}
-
-// Costs and areas that make small and large leaves, and empty ones.
-std::vector<SahOptions> weights() {
-  return {{},
-          {.test_cost = 0.25F},
-          {.visit_cost = 0.5F, .test_cost = 3.0F},
-          {.areas = SahAreas::cells},
-          {.areas = SahAreas::cells, .empty_bonus = 0.5F}};
+  return test::sah_options(Builder::sah, sah);
 }
 
 std::string text_of(const SahOptions& sah) {
@@ -65,7 +52,7 @@ bool same_box(const Box& a, const Node& node, int which) {
 TEST_P(SahTree, IsThatOfBruteForce) {
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
-    for (const SahOptions& sah : weights()) {
+    for (const SahOptions& sah : test::sah_weights()) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + text_of(sah));
       const Tree tree = build(cpu::Executor{}, m.mesh.view(), options_for(sah));
       const test::PlainTree want = test::PlainSah(m.mesh, sah, tree.view().bounds()).tree;
@@ -92,7 +79,7 @@ TEST_P(SahTree, IsThatOfBruteForce) {
 TEST_P(SahTree, HasItsProperties) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
-    for (const SahOptions& sah : weights()) {
+    for (const SahOptions& sah : test::sah_weights()) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + text_of(sah));
       const Tree tree = build(cpu::Executor{}, m.mesh.view(), options_for(sah));
       expect_properties(tree, m.mesh);
@@ -111,18 +98,8 @@ TEST_P(SahTree, HasItsProperties) {
 INSTANTIATE_TEST_SUITE_P(Every, SahTree, testing::ValuesIn(test::every_mesh_kind()),
                          [](const auto& kind) { return kind.param.name(); });
 
-// Large enough for the passes over generations.
-std::vector<test::NamedMesh> large_meshes() {
-  std::vector<test::NamedMesh> all;
-  all.push_back({"soup", scene::soup(10000, 3)});
-  all.push_back({"sphere", scene::sphere(5)});
-  all.push_back({"stadium", scene::small_in_large(10000, 1e4F, 3)});
-  all.push_back({"grid", scene::grid(14)});
-  return all;
-}
-
 TEST(SahBuild, LargeScenesHaveTheirProperties) {
-  for (const test::NamedMesh& m : large_meshes()) {
+  for (const test::NamedMesh& m : test::large_sah_meshes()) {
     SCOPED_TRACE(m.name);
     expect_properties(build(cpu::Executor{.threads = 2}, m.mesh.view(), options_for()), m.mesh);
   }
@@ -131,7 +108,7 @@ TEST(SahBuild, LargeScenesHaveTheirProperties) {
 // ---- The same tree ------------------------------------------------------------------------------
 
 TEST(SahBuild, OneTreeForAnyThreadsAndInstructions) {
-  for (const test::NamedMesh& m : large_meshes()) {
+  for (const test::NamedMesh& m : test::large_sah_meshes()) {
     SCOPED_TRACE(m.name);
     const std::string want = tree_hash(build({.threads = 1}, m.mesh.view(), options_for()).view());
     for (const int threads : {1, 2, 3, 8})
@@ -156,13 +133,13 @@ void expect_same_tree_permuted(const scene::Mesh& mesh, const BuildOptions& opti
 
 TEST_P(SahTree, IsTheSameForPermutedTriangles) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
-    for (const SahOptions& sah : weights())
+    for (const SahOptions& sah : test::sah_weights())
       expect_same_tree_permuted(test::small_mesh(GetParam().number, seed).mesh, options_for(sah),
                                 seed);
 }
 
 TEST(SahBuild, LargeScenesAreTheSameForPermutedTriangles) {
-  for (const test::NamedMesh& m : large_meshes()) {
+  for (const test::NamedMesh& m : test::large_sah_meshes()) {
     SCOPED_TRACE(m.name);
     expect_same_tree_permuted(m.mesh, options_for(), 7);
   }
@@ -324,7 +301,7 @@ TEST(SahBuild, CostsHaveNoUnit) {
 }
 
 TEST(SahBuild, BetterThanMorton) {
-  for (const test::NamedMesh& m : large_meshes()) {
+  for (const test::NamedMesh& m : test::large_sah_meshes()) {
     SCOPED_TRACE(m.name);
     const double cost = build(cpu::Executor{}, m.mesh.view(), options_for()).statistics().sah_cost;
     for (const References references : {References::once, References::all}) {

@@ -191,7 +191,7 @@ TEST(TreeBuild, SmallModelInALargeSceneComesApart) {
     const scene::Mesh mesh =
         scene::joined(scene::small_in_large(0, ratio, 6), scene::soup(20000, 6));
     for (const References references : {References::once, References::budget, References::all}) {
-      BuildOptions options{.references = references, .measure_quality = true};
+      BuildOptions options{.references = references, .leaf_size = 4, .measure_quality = true};
       const Tree tree = test::build(mesh.view(), options);
       EXPECT_LE(tree.statistics().largest_leaf, 128u) << "ratio " << ratio;
       EXPECT_GT(tree.statistics().leaves, 5000u) << "ratio " << ratio;
@@ -310,6 +310,27 @@ TEST(TreeBuild, SkipsAreReported) {
   EXPECT_TRUE(soup.statistics().skip(Skip::recoding).taken);
   EXPECT_TRUE(soup.statistics().skip(Skip::wide_codes).taken);
   EXPECT_TRUE(soup.statistics().skip(Skip::compaction).taken);
+}
+
+// A leaf of `all` is crowded by what it lists: with 1, by more than four.
+TEST(TreeBuild, CrowdedLeavesAreCounted) {
+  const scene::Mesh fan = scene::fan(100);  // all of them touch the cell round the tip
+  const Statistics crowded =
+      test::build(fan.view(), {.references = References::all, .leaf_size = 1}).statistics();
+  EXPECT_GE(crowded.crowded_leaves, 1u);
+  EXPECT_GT(crowded.crowded_references, 4 * crowded.crowded_leaves);
+  EXPECT_TRUE(crowded.skip(Skip::subtrees).considered);
+  EXPECT_FALSE(crowded.skip(Skip::subtrees).taken);
+
+  const Statistics roomy =
+      test::build(fan.view(), {.references = References::all, .leaf_size = 100}).statistics();
+  EXPECT_EQ(roomy.crowded_leaves, 0u);
+  EXPECT_EQ(roomy.crowded_references, 0u);
+  EXPECT_TRUE(roomy.skip(Skip::subtrees).taken);
+
+  const Statistics once = test::build(fan.view(), {.leaf_size = 1}).statistics();
+  EXPECT_EQ(once.crowded_leaves, 0u);
+  EXPECT_FALSE(once.skip(Skip::subtrees).considered);
 }
 
 TEST(TreeBuild, SkipsAreLookedForWhereTheyCanBe) {

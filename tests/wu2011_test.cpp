@@ -17,6 +17,7 @@
 #include "support/hits.hpp"
 #include "support/meshes.hpp"
 #include "support/platform_tree.hpp"
+#include "support/sah_cases.hpp"
 #include "verify/properties.hpp"
 #include "verify/tree_hash.hpp"
 
@@ -25,26 +26,13 @@ namespace {
 
 using verify::tree_hash;
 
-BuildOptions options_for(const SahOptions& sah = {}, Builder builder = Builder::wu2011) {
-  BuildOptions options;
-  options.builder = builder;
-  options.sah = sah;
-  options.invalid_triangles = InvalidTriangles::skip;
-  options.measure_quality = true;
-  return options;
-}
-
-// Costs and areas that make small and large leaves, and empty ones.
-std::vector<SahOptions> weights() {
-  return {{},
-          {.test_cost = 0.25F},
-          {.visit_cost = 0.5F, .test_cost = 3.0F},
-          {.areas = SahAreas::cells},
-          {.areas = SahAreas::cells, .empty_bonus = 0.5F}};
+BuildOptions options_for(const SahOptions& sah = {}) {
+  return test::sah_options(Builder::wu2011, sah);
 }
 
 std::string sah_hash(const scene::Mesh& mesh, const SahOptions& sah = {}) {
-  return tree_hash(build(cpu::Executor{}, mesh.view(), options_for(sah, Builder::sah)).view());
+  return tree_hash(
+      build(cpu::Executor{}, mesh.view(), test::sah_options(Builder::sah, sah)).view());
 }
 
 void expect_the_tree_of_sah(const scene::Mesh& mesh, const SahOptions& sah = {}) {
@@ -56,13 +44,8 @@ void expect_the_tree_of_sah(const scene::Mesh& mesh, const SahOptions& sah = {})
   }
 }
 
-// A level with thousands of events, so that passes are divided among threads.
 std::vector<test::NamedMesh> large_meshes() {
-  std::vector<test::NamedMesh> all;
-  all.push_back({"soup", scene::soup(10000, 3)});
-  all.push_back({"sphere", scene::sphere(5)});
-  all.push_back({"stadium", scene::small_in_large(10000, 1e4F, 3)});
-  all.push_back({"grid", scene::grid(14)});
+  std::vector<test::NamedMesh> all = test::large_sah_meshes();
   all.push_back({"needles", scene::needles(1000, 5)});
   if (test::build_thinning() > 1) all.resize(2);
   return all;
@@ -74,7 +57,7 @@ class Wu2011 : public testing::TestWithParam<test::MeshKind> {};
 TEST_P(Wu2011, IsTheTreeOfSah) {
   const std::uint64_t seeds = test::build_thinning() > 1 ? 1 : 2;
   for (std::uint64_t seed = 1; seed <= seeds; ++seed)
-    for (const SahOptions& sah : weights()) {
+    for (const SahOptions& sah : test::sah_weights()) {
       const scene::Mesh mesh = test::small_mesh(GetParam().number, seed).mesh;
       ASSERT_EQ(tree_hash(test::build(mesh.view(), options_for(sah)).view()), sah_hash(mesh, sah))
           << "seed " << seed << ", " << to_string(sah.areas) << ", test cost " << sah.test_cost;

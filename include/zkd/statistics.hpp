@@ -42,6 +42,7 @@ enum class Skip : std::uint8_t {
   splitting,     ///< even boxes: no triangle is split, with References::automatic; amount: 1
   recoding,      ///< no crowded trunk, no second round; amount: 1
   compaction,    ///< no triangle left out, ids need no renumbering; amount: 1
+  subtrees,      ///< no crowded leaf, none is split, with References::all; amount: 1
   count,
 };
 
@@ -73,6 +74,9 @@ struct Statistics {
   std::uint64_t crowded_trunks = 0;      ///< codes shared by more than leaf_size triangles; 0
                                          ///< without BuildOptions::recode_crowded
   std::uint64_t crowded_triangles = 0;   ///< triangles in them
+  std::uint64_t crowded_leaves = 0;      ///< leaves of `all` that were coded again, because they
+                                         ///< listed more than 4 * leaf_size triangles
+  std::uint64_t crowded_references = 0;  ///< references that they had
   std::uint64_t nodes = 0;               ///< inner nodes
   std::uint64_t leaves = 0;
   std::uint64_t references = 0;

@@ -54,23 +54,24 @@ const char* to_string(Stage stage) noexcept {
                  stage);
 }
 const char* to_string(Skip skip) noexcept {
-  return name_of(
-      std::array{"radix passes", "flat axes", "wide codes", "splitting", "recoding", "compaction"},
-      skip);
+  return name_of(std::array{"radix passes", "flat axes", "wide codes", "splitting", "recoding",
+                            "compaction", "subtrees"},
+                 skip);
 }
 const char* reason(Skip skip, bool taken) noexcept {
   return taken ? name_of(
                      std::array{"every code has the same digit there", "nothing extends along them",
                                 "few triangles: short codes tell them apart",
                                 "boxes of much the same size: splitting would not pay",
-                                "no crowded trunk", "no triangle left out"},
+                                "no crowded trunk", "no triangle left out", "no crowded leaf"},
                      skip)
                : name_of(
                      std::array{"codes differ in every digit", "the scene extends along every axis",
                                 "many triangles: short codes would crowd them",
                                 "boxes of very different sizes: triangles were split",
                                 "trunks are crowded",
-                                "triangles were left out, the others have to close up"},
+                                "triangles were left out, the others have to close up",
+                                "crowded leaves were split"},
                      skip);
 }
 

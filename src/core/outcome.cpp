@@ -34,6 +34,8 @@ Statistics describe(const BuildState& state, const BuildOptions& options, std::u
   statistics.code_bits = state.lattice.code_bits;
   statistics.crowded_trunks = counts.crowded_trunks;
   statistics.crowded_triangles = counts.crowded_triangles;
+  statistics.crowded_leaves = counts.crowded_leaves;
+  statistics.crowded_references = counts.crowded_references;
   statistics.nodes = counts.nodes;
   statistics.leaves = counts.trunks;
   statistics.references = counts.references;
@@ -56,6 +58,8 @@ Statistics describe(const BuildState& state, const BuildOptions& options, std::u
   report(Skip::recoding, options.recode_crowded,
          options.recode_crowded && counts.crowded_trunks == 0 ? 1 : 0);
   report(Skip::compaction, true, state.report.valid == triangles && counts.splits == 0 ? 1 : 0);
+  const bool strict = options.references == References::all;
+  report(Skip::subtrees, strict, strict && counts.crowded_leaves == 0 ? 1 : 0);
   return statistics;
 }
 

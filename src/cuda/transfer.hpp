@@ -83,6 +83,8 @@ inline core::BuildState state_of(const zkd::Tree& tree) {
   counts.splits = tree.options().references == References::budget ? 1 : 0;
   counts.crowded_trunks = static_cast<std::uint32_t>(statistics.crowded_trunks);
   counts.crowded_triangles = static_cast<std::uint32_t>(statistics.crowded_triangles);
+  counts.crowded_leaves = static_cast<std::uint32_t>(statistics.crowded_leaves);
+  counts.crowded_references = static_cast<std::uint32_t>(statistics.crowded_references);
   counts.trunks = tree.view().leaf_count();
   counts.nodes = tree.view().node_count();
   counts.references = tree.view().reference_count();
