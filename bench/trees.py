@@ -10,6 +10,7 @@ KINDS = ("primary", "diffuse", "shadow")
 SCENES = ("bunny", "fairy", "conference", "sibenik", "dragon", "buddha", "sponza", "armadillo")
 SIZE = os.environ.get("ZKD_TREES_SIZE", "512")
 REPEAT = os.environ.get("ZKD_TREES_REPEAT", "5")
+THREADS = os.environ.get("ZKD_TREES_THREADS", "1,0")
 
 
 def measure(program, folder, scene, threads):
@@ -112,7 +113,7 @@ def main():
     program, folder = sys.argv[1:3]
     os.makedirs(folder, exist_ok=True)
     for scene in sys.argv[3:] or SCENES:
-        for threads in (1, 0):
+        for threads in (int(number) for number in THREADS.split(",")):
             results = measure(program, folder, scene, threads)
             count = results[0]["threads"]
             print(f"### {scene}, {results[0]['triangles']:,} triangles, {count} thread(s)\n")

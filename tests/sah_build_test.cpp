@@ -297,7 +297,7 @@ TEST(SahBuild, CostsHaveNoUnit) {
   const scene::Mesh mesh = scene::soup(500, 9);
   EXPECT_EQ(
       tree_hash(build(mesh.view(), options_for()).view()),
-      tree_hash(build(mesh.view(), options_for({.visit_cost = 8.0F, .test_cost = 8.0F})).view()));
+      tree_hash(build(mesh.view(), options_for({.visit_cost = 8.0F, .test_cost = 4.0F})).view()));
 }
 
 TEST(SahBuild, BetterThanMorton) {

@@ -30,9 +30,9 @@ std::uint32_t few_where_many(std::uint32_t triangles) {
 // Through the top of the cone, from inside it or from above: from points round the axis, which are
 // within the cone of any number of triangles.
 Case top_of_fan(std::uint32_t triangles, const Setting& setting) {
-  Case made =
-      hard_case("the top of " + std::to_string(triangles), scene::fan(triangles),
-                triangles > 100000 ? only_once() : once_and_all(), setting.pick(400u, 1000u));
+  Case made = hard_case("the top of " + std::to_string(triangles), scene::fan(triangles),
+                        triangles > 100000 ? only_once() : once_and_all(),
+                        setting.pick(triangles > 1000 ? 100u : 400u, 1000u));
   made.rays = [](const Mesh& mesh, const TreeView&, std::uint32_t count, std::uint64_t seed) {
     Random random(seed);
     std::vector<Ray> rays;
@@ -52,9 +52,10 @@ void fans(const Setting& setting, const Yield& yield) {
   for (const std::uint32_t triangles :
        {4u, 5u, 64u, 1000u, setting.pick(4000u, 30000u), setting.pick(8000u, 1000000u)}) {
     yield(top_of_fan(triangles, setting));
-    Case made = hard_case("all of " + std::to_string(triangles), scene::fan(triangles),
-                          triangles > 100000 ? only_once() : some_options(setting),
-                          triangles > 10000 ? 100 : setting.pick(600u, 1000u));
+    Case made =
+        hard_case("all of " + std::to_string(triangles), scene::fan(triangles),
+                  triangles > 100000 ? only_once() : some_options(setting),
+                  triangles > 10000 ? 100 : setting.pick(triangles > 1000 ? 150u : 600u, 1000u));
     made.oracle_rays = few_where_many(triangles);
     yield(std::move(made));
   }

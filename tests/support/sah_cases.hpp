@@ -24,6 +24,7 @@ inline BuildOptions sah_options(Builder builder, const SahOptions& sah = {}) {
 /// Costs and areas that make small and large leaves, and empty ones.
 inline std::vector<SahOptions> sah_weights() {
   return {{},
+          {.test_cost = 1.0F},
           {.test_cost = 0.25F},
           {.visit_cost = 0.5F, .test_cost = 3.0F},
           {.areas = SahAreas::cells},
