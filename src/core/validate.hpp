@@ -38,6 +38,11 @@ struct ValidateTriangle {
   Box* boxes;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {
+    boxes[triangle] = box_of(triangle, report);
+  }
+
+  /// The box, which is not written.
+  ZKD_HOST_DEVICE Box box_of(std::uint32_t triangle, ValidationReport& report) const {
     Box box;
     bool in_range = true;
     if (triangles.indices != nullptr)
@@ -65,7 +70,7 @@ struct ValidateTriangle {
         include(report.bounds, box);
       }
     }
-    boxes[triangle] = box;
+    return box;
   }
 };
 
