@@ -27,19 +27,10 @@ struct SizeClasses {
   static constexpr std::int32_t lowest = -300;
   static constexpr std::uint32_t count = 580;
 
-  /// The class of half the surface of a triangle's box; `count` for one left out. Sides are rounded
-  /// to floats: near enough, and half the conversions.
-  [[nodiscard]] static ZKD_HOST_DEVICE std::uint32_t of(const Box& box) {
-    if (!(box.lo[0] <= box.hi[0])) return count;
-    const double x = side(box, 0);
-    const double y = side(box, 1);
-    const double z = side(box, 2);
-    return static_cast<std::uint32_t>(exponent_of(x * y + (x + y) * z) - lowest);
-  }
-
- private:
-  [[nodiscard]] static ZKD_HOST_DEVICE double side(const Box& box, int axis) {
-    return static_cast<double>(smaller(box.hi[axis] - box.lo[axis], 0x1.fffffep127F));
+  /// The class of a half surface; `count` for none.
+  [[nodiscard]] static ZKD_HOST_DEVICE std::uint32_t of(double half_area) {
+    if (!(half_area > 0.0)) return count;
+    return static_cast<std::uint32_t>(exponent_of(half_area) - lowest);
   }
 };
 
@@ -48,9 +39,9 @@ struct ValidateAndMeasure {
   ValidateTriangle validate;
 
   ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t triangle, ValidationReport& report) const {
-    const Box box = validate.box_of(triangle, report);
-    validate.boxes[triangle] = box;
-    return SizeClasses::of(box);
+    validate(triangle, report);
+    const Box& box = validate.boxes[triangle];
+    return box.empty() ? SizeClasses::count : SizeClasses::of(half_area(box));
   }
 };
 

@@ -38,11 +38,6 @@ struct ValidateTriangle {
   Box* boxes;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {
-    boxes[triangle] = box_of(triangle, report);
-  }
-
-  /// The box, which is not written.
-  ZKD_HOST_DEVICE Box box_of(std::uint32_t triangle, ValidationReport& report) const {
     Box box;
     bool in_range = true;
     if (triangles.indices != nullptr)
@@ -70,7 +65,7 @@ struct ValidateTriangle {
         include(report.bounds, box);
       }
     }
-    return box;
+    boxes[triangle] = box;
   }
 };
 
