@@ -115,9 +115,8 @@ struct BuildOptions {
   /// bits at most. With References::all it is no gain.
   Quality quality = Quality::fast;
 
-  /// `once` takes about a tenth of the time to build that `all` takes and two thirds of the memory
-  /// (Bunny, Sibenik, Conference, Dragon). `all` has what only a strict kd-tree gives: disjoint
-  /// cells.
+  /// `once` takes about a tenth of the time to build that `all` takes (Bunny, Sibenik). `all` has
+  /// what only a strict kd-tree gives: disjoint cells.
   References references = References::once;
 
   /// References per valid triangle that `budget` may use, counted over the whole scene and never
