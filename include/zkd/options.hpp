@@ -71,10 +71,10 @@ struct SahOptions {
   /// minimises what Statistics::sah_cost measures.
   float visit_cost = 1.0F;
 
-  /// Of a triangle test, in the same unit; 1/1024 to 1024. A wide tree tests eight at once: with 0.5
-  /// in place of 1 it is traced 0 to 9 % faster, a binary one as fast within 4 %, at 0.3 to 0.8 of
-  /// the memory and 0.6 to 0.8 of the time to build; with 0.25 a wide tree is another 0 to 6 %
-  /// faster and a binary one up to 19 % slower (Bunny, Sibenik, Conference).
+  /// Of a triangle test, in the same unit; 1/1024 to 1024. A wide tree tests eight at once: with
+  /// 0.5 in place of 1 it was traced 0 to 9 % faster and built in 0.6 to 0.8 of the time (Bunny,
+  /// Sibenik, Conference), and a binary one, of half the memory, as fast within 4 % (Bunny,
+  /// Sibenik); with 0.25 binary ones were 13 and 19 % slower.
   float test_cost = 0.5F;
 
   /// `tight`: a ray enters a child by its tight box, so that this is what its cost depends on. The
@@ -121,8 +121,8 @@ struct BuildOptions {
 
   /// References per valid triangle that `budget` may use, counted over the whole scene and never
   /// exceeded; finite, at least 1. 1.3 took a third off the node visits and half off the triangle
-  /// tests in Conference; twice as much gained little more. No triangle gets more than 1024. Room
-  /// is made for as many before the scene is known.
+  /// tests in Conference; twice as much gained little more. No triangle is cut into more than
+  /// 1024. Room for all that this allows is made before the scene is known.
   float budget = 1.3F;
 
   /// References that a CUDA build of `all` makes room for, at most max_count: there memory is taken
@@ -135,10 +135,10 @@ struct BuildOptions {
   /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
   /// 1024, or 0: 4, with `all` 8. With `all` a leaf that lists more than four times as many is
   /// split again, by what lies in its cell, into trunks of twice as many. Of 1, 2, 4 and 8, 4 was
-  /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; `all` is
-  /// built 1.4 to 1.8 times as fast with 8 as with 4 in a little over half the memory, and traced
-  /// as fast as a wide tree, a tenth slower as a binary one (Bunny, Sibenik, Conference). Time of
-  /// the trunk stage grows with it.
+  /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; `all` was
+  /// built 1.3 to 1.8 times as fast with 8 as with 4 in 0.5 to 0.6 of the memory, and traced as a
+  /// wide tree within a tenth of the speed (Bunny, Sibenik, Conference), as a binary one at 0.8 to
+  /// 0.9 of it (Bunny, Sibenik). Time of the trunk stage grows with it.
   std::uint32_t leaf_size = 0;
 
   /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. With 32
