@@ -163,6 +163,31 @@ TEST(TreeAutomatic, DoesNotDependOnScale) {
   }
 }
 
+// The scene grows while its triangles are measured, and small ones are left out by what was seen of
+// it: the largest first, last, and anywhere must lead to the same.
+TEST(TreeAutomatic, DoesNotDependOnOrder) {
+  BuildOptions options;
+  options.references = References::automatic;
+  std::uint32_t split = 0;
+  constexpr std::uint32_t scenes = 24;
+  for (std::uint32_t n = 1; n <= scenes; ++n) {
+    const scene::Mesh needles = scene::scaled(scene::needles(n, n), 5);
+    const scene::Mesh spheres = scene::joined(scene::offset(scene::sphere(4), {20, 3, 8}),
+                                              scene::offset(scene::sphere(4), {9, 9, 9}));
+    const References first =
+        test::build(scene::joined(needles, spheres).view(), options).options().references;
+    const scene::Mesh last = scene::joined(spheres, needles);
+    EXPECT_EQ(test::build(last.view(), options).options().references, first) << n;
+    for (std::uint64_t seed = 0; seed < 4; ++seed)
+      EXPECT_EQ(test::build(scene::shuffled(last, seed).view(), options).options().references,
+                first)
+          << n << ", seed " << seed;
+    split += first == References::budget ? 1 : 0;
+  }
+  EXPECT_GT(split, 0u);
+  EXPECT_LT(split, scenes);
+}
+
 // ---- Balanced -----------------------------------------------------------------------------------
 
 TEST(TreeBalanced, IsCheaperToTrace) {

@@ -39,6 +39,19 @@ using Lanes = double __attribute__((vector_size(32)));
 [[gnu::always_inline]] inline void go(const Lanes& from, const Lanes& to, double s, Lanes& at) {
   at = from + s * (to - from);
 }
+/// (x, y, z) to (y, z, x).
+[[gnu::always_inline]] inline void rotate(const Lanes& from, Lanes& to) {
+#if defined(__clang__)
+  to = __builtin_shufflevector(from, from, 1, 2, 0, 3);
+#else
+  using Places = std::int64_t __attribute__((vector_size(32)));
+  to = __builtin_shuffle(from, Places{1, 2, 0, 3});
+#endif
+}
+[[gnu::always_inline]] inline void take_magnitude(const Lanes& x, Lanes& size) {
+  using Bits = std::int64_t __attribute__((vector_size(32)));
+  size = reinterpret_cast<Lanes>(reinterpret_cast<Bits>(x) & 0x7FFF'FFFF'FFFF'FFFF);
+}
 #endif
 
 }  // namespace zkd::core

@@ -82,14 +82,27 @@ ZKD_HOST_DEVICE inline Wide normal(const Corners& c, int axis) {
                         static_cast<double>(c.p[2][i]), static_cast<double>(c.p[2][j]));
 }
 
+/// Shewchuk's bound for the sign of a difference of products, relative to the sum of their
+/// magnitudes: (3 + 16 u) u with u = 2^-53.
+inline constexpr double projection_bound = 3.3306690738754716e-16;
+
 /// Whether the area of the triangle's projection differs from zero for certain.
 ZKD_HOST_DEVICE inline bool projection_surely_has_area(Wide ax, Wide ay, Wide bx, Wide by, Wide cx,
                                                        Wide cy) {
   const Wide left = (bx - ax) * (cy - ay);
   const Wide right = (by - ay) * (cx - ax);
-  // Shewchuk's bound for the sign of the difference, (3 + 16 u) u with u = 2^-53.
-  const Wide bound = Wide(3.3306690738754716e-16) * (magnitude(left) + magnitude(right));
+  const Wide bound = Wide(projection_bound) * (magnitude(left) + magnitude(right));
   return magnitude(left - right) > bound;
+}
+
+/// The same of one of the three projections.
+ZKD_HOST_DEVICE inline bool any_projection_surely_has_area(const Corners& c) {
+  const float* a = c.p[0];
+  const float* b = c.p[1];
+  const float* d = c.p[2];
+  return projection_surely_has_area(a[0], a[1], b[0], b[1], d[0], d[1]) ||
+         projection_surely_has_area(a[1], a[2], b[1], b[2], d[1], d[2]) ||
+         projection_surely_has_area(a[2], a[0], b[2], b[0], d[2], d[0]);
 }
 
 /// Whether two points are the same.
@@ -97,20 +110,18 @@ ZKD_HOST_DEVICE inline bool coincide(const float* a, const float* b) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/// Exactly: corners that coincide or lie on one line. A float cross product of zero would also
-/// throw away real slivers.
-ZKD_HOST_DEVICE inline bool has_zero_area(const Corners& c) {
-  const float* a = c.p[0];
-  const float* b = c.p[1];
-  const float* d = c.p[2];
-  // One projection with an area is enough, and that of a wall need not be the first. Exact sums,
-  // which take long, are left for what neither has an area for certain nor corners that coincide.
-  if (projection_surely_has_area(a[0], a[1], b[0], b[1], d[0], d[1]) ||
-      projection_surely_has_area(a[1], a[2], b[1], b[2], d[1], d[2]) ||
-      projection_surely_has_area(a[2], a[0], b[2], b[0], d[2], d[0]))
-    return false;
-  if (coincide(a, b) || coincide(b, d) || coincide(d, a)) return true;
+/// Zero area of a triangle that does not surely have one. Exact sums, which take long, are left for
+/// corners that differ.
+ZKD_HOST_DEVICE inline bool has_zero_area_exactly(const Corners& c) {
+  if (coincide(c.p[0], c.p[1]) || coincide(c.p[1], c.p[2]) || coincide(c.p[2], c.p[0])) return true;
   return normal(c, 0) == Wide(0.0) && normal(c, 1) == Wide(0.0) && normal(c, 2) == Wide(0.0);
+}
+
+/// Exactly: corners that coincide or lie on one line. A float cross product of zero would also
+/// throw away real slivers. One projection with an area is enough, and that of a wall need not be
+/// the first.
+ZKD_HOST_DEVICE inline bool has_zero_area(const Corners& c) {
+  return !any_projection_surely_has_area(c) && has_zero_area_exactly(c);
 }
 
 /// Whether a build takes the triangle. Its indices must be in range.
