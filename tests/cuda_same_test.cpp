@@ -175,13 +175,13 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         LargerScene{"Soup", [] { return scene::soup(100000, 41); }},
         LargerScene{"Sphere", [] { return scene::sphere(6); }},
-        LargerScene{"Grid", [] { return scene::grid(20); }},
+        LargerScene{"Grid", [] { return scene::grid(16); }},
         LargerScene{"TeapotInAStadium", [] { return scene::small_in_large(40000, 1e6F, 41); }},
         LargerScene{"Crowds",
-                    [] { return scene::joined(scene::soup(30000, 42), scene::identical(30000)); }},
+                    [] { return scene::joined(scene::soup(20000, 42), scene::identical(10000)); }},
         LargerScene{
             "Stairs",
-            [] { return scene::joined(scene::staircase(300), scene::same_centre(8000, 43)); }}),
+            [] { return scene::joined(scene::staircase(300), scene::same_centre(3000, 43)); }}),
     [](const auto& one) { return std::string(one.param.name); });
 
 TEST(CudaSameTree, ForAThousandTriangles) {

@@ -83,7 +83,7 @@ TEST_P(HitsKept, DoNotChangeTheList) {
         BuildOptions options{.references = references, .leaf_size = leaf_size};
         options.invalid_triangles = InvalidTriangles::skip;
         const Tree tree = build(triangles, options);
-        const std::vector<Ray> rays = scene::hard_rays(m.mesh, tree.view(), 48, seed);
+        const std::vector<Ray> rays = scene::hard_rays(m.mesh, tree.view(), 32, seed);
         const std::span few = std::span(rays).first(8);  // exact arithmetic is slow
         expect_same_lists<core::BoxTest, core::Watertight>(tree, triangles, rays,
                                                            Intersector::watertight);

@@ -8,8 +8,8 @@
 // evenly, the node of a box of p of the scene's surface would lie log2(p N) levels higher than a
 // leaf: a random line that meets the box visits about so many nodes that it would not need. Summed
 // over all triangles for which these are more than `few_levels`, that is the unevenness of a scene:
-// 0 to 12 for scans and the Fairy's meadow, 48 for Sibenik, where splitting still saves nothing, 105
-// for the Conference room and 139 for Sponza, where it saves a third of the visits.
+// 0 to 12 for scans and the Fairy's meadow, 48 for Sibenik, where splitting still saves nothing,
+// 105 for the Conference room and 139 for Sponza, where it saves a third of the visits.
 //
 // Triangles of fewer levels are most of a scan and do not tell scenes apart; leaving them out is
 // what makes the measure cheap.
@@ -38,7 +38,7 @@ struct SizeClasses {
 };
 
 /// Nodes that a box may cost a line without being counted.
-inline constexpr double few_levels = 5.0;
+inline constexpr int few_levels = 5;
 
 /// ValidateTriangle, and the class of the triangle's box; of boxes that can only cost few levels,
 /// which are told by their longest sides: none.
@@ -58,8 +58,9 @@ struct ValidateAndMeasure {
     if (!(longest * longest > too_short)) return SizeClasses::count;
     // Half the surface is at most three squares of the longest side, and bounds only grow.
     if (measured++ % 16 == 0)
-      too_short = half_area(report.bounds) / static_cast<double>(validate.triangles.triangle_count) *
-                  (power_of_two(static_cast<int>(few_levels)) / 3.0);
+      too_short = half_area(report.bounds) /
+                  static_cast<double>(validate.triangles.triangle_count) *
+                  (power_of_two(few_levels) / 3.0);
     return SizeClasses::of(half_area(box));
   }
 };
@@ -81,7 +82,7 @@ ZKD_HOST_DEVICE inline bool is_uneven(const std::uint32_t* classes, const Box& b
     if (classes[c] == 0) continue;
     const int log_size = static_cast<int>(c) + SizeClasses::lowest;
     const double levels = log_size + 0.5 - log_even;
-    // A box of few_levels may be in the class of half a level more; log_even is 0.09 too low at most.
+    // A box of few_levels may be in the class of half a level more; log_even is 0.09 low at most.
     if (levels <= few_levels + 0.6) continue;
     const double size = 1.4142135623730951 * power_of_two(log_size);
     sum += static_cast<double>(classes[c]) * (size / half_area(bounds)) * levels;

@@ -472,32 +472,20 @@ struct zkd::core::BackendOf<zkd::simulated::Executor> {
 
 namespace zkd {
 
-// As for cuda::Executor: see zkd/cuda/build.hpp and zkd/cuda/query.hpp.
+// As for cuda::Executor: see zkd/cuda/build.hpp and zkd/cuda/query.hpp. Builds are in
+// simulated_device.cpp, since their passes take long to compile.
 
-inline simulated::Tree build(const simulated::Executor& executor, const TriangleView& triangles,
-                             const BuildOptions& options = {}) {
-  simulated::Device device(executor);
-  return {cuda::build_on(device, executor, triangles, options), executor};
-}
+simulated::Tree build(const simulated::Executor& executor, const TriangleView& triangles,
+                      const BuildOptions& options = {});
 
-inline void rebuild(const simulated::Executor& executor, cuda::Tree& tree,
-                    const TriangleView& triangles) {
-  simulated::Device device(executor);
-  cuda::rebuild_on(device, executor, tree, triangles);
-}
+void rebuild(const simulated::Executor& executor, cuda::Tree& tree, const TriangleView& triangles);
 
-inline BuildOptions analyse(const simulated::Executor& executor, const TriangleView& triangles,
-                            const BuildOptions& options = {}) {
-  simulated::Device device(executor);
-  return cuda::analyse_on(device, executor, triangles, options);
-}
+BuildOptions analyse(const simulated::Executor& executor, const TriangleView& triangles,
+                     const BuildOptions& options = {});
 
-inline MemoryRequirement memory_requirement(const simulated::Executor& executor,
-                                            std::uint64_t triangle_count,
-                                            const BuildOptions& options = {}) {
-  simulated::Device device(executor);
-  return cuda::requirement(device, triangle_count, options);
-}
+MemoryRequirement memory_requirement(const simulated::Executor& executor,
+                                     std::uint64_t triangle_count,
+                                     const BuildOptions& options = {});
 
 inline void closest_hit(const simulated::Executor& executor, const TreeView& tree,
                         const TriangleView& triangles, std::span<const Ray> rays,
