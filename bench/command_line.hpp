@@ -8,11 +8,13 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "usage_error.hpp"
@@ -32,6 +34,12 @@ inline constexpr const char* exit_status_help =
 
 /// False: --help or --version was given and has been answered. Throws UsageError.
 [[nodiscard]] inline bool parse(CLI::App& app, int argc, const char* const* argv) {
+  // CLI11 would take what stands behind it, such as a mesh, for the value: of --json=$NOTHING.
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (argument.starts_with('-') && argument.ends_with('='))
+      throw UsageError(std::string(argument) + " has no value");
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& done) {
@@ -52,7 +60,9 @@ inline CLI::Option* add_whole_number(CLI::App& app, const char* name, std::int64
       ->capture_default_str()
       ->check([lowest, highest](const std::string& given) {
         std::int64_t read = 0;
-        if (CLI::detail::lexical_cast(given, read) && read >= lowest && read <= highest) {
+        const auto [end, error] = std::from_chars(given.data(), given.data() + given.size(), read);
+        if (error == std::errc() && end == given.data() + given.size() && read >= lowest &&
+            read <= highest) {
           return std::string();
         }
         return "'" + given + "' is not a whole number from " + std::to_string(lowest) + " to " +

@@ -15,7 +15,8 @@ namespace zkd::bench {
 
 enum ExitStatus { done = 0, check_failed = 1, bad_input = 2, device_failure = 3 };
 
-/// Runs run(), which returns an exit status; what it throws becomes a line and a status.
+/// Runs run(), which returns an exit status; what it throws becomes a line and a status, and so
+/// does standard output that could not be written.
 template <class Run>
 int exit_status_of(const char* program, Run run) {
   const auto fail = [program](ExitStatus status, std::string message) -> int {
@@ -24,7 +25,9 @@ int exit_status_of(const char* program, Run run) {
     return status;
   };
   try {
-    return run();
+    const int status = run();
+    std::cout.flush();
+    return std::cout ? status : fail(bad_input, "cannot write to standard output");
   } catch (const Error& error) {
     const bool of_machine = error.code() == ErrorCode::out_of_memory ||
                             error.code() == ErrorCode::backend_unavailable ||

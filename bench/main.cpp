@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "json.hpp"
 #include "machine.hpp"
 #include "options.hpp"
+#include "output_file.hpp"
 #include "run.hpp"
 #include "scene/catalog.hpp"
 #include "scene/image.hpp"
@@ -61,14 +61,6 @@ int run_cold(const Options& options) {
   return done;
 }
 
-// Rewritten after each scene, so that what was measured is kept if a later one fails.
-void write_json(const std::filesystem::path& path, const Machine& machine,
-                const std::vector<Result>& results) {
-  std::ofstream file(path, std::ios::trunc);
-  file << to_json(machine, results) << std::flush;
-  if (!file) throw UsageError("--json: cannot write " + path.string());
-}
-
 bool failed(const Result& result) {
   return (result.check && result.check->outside.total() > 0) ||
          (result.gpu && !(result.gpu->hash_equal && result.gpu->hits_equal));
@@ -102,8 +94,11 @@ int run(const Options& options) {
   if (where.backend == Backend::cuda) describe_device(machine);
 
   std::vector<Result> results;
-  // Before anything is measured, so that a bad path costs no minutes.
-  if (options.json && !json_only) write_json(*options.json, machine, results);
+  std::optional<OutputFile> json;
+  if (options.json && !json_only) {
+    json.emplace("--json", *options.json);
+    for (const scene::SceneInfo& info : scenes) json->must_not_be(info.path);
+  }
   if (!json_only) print_header(std::cout, options, machine, where.backend, where.why_not_cuda);
 
   for (const scene::SceneInfo& info : scenes) {
@@ -114,15 +109,14 @@ int run(const Options& options) {
     }
     std::vector<Result> of_scene = run_scene(info, options, where.backend, executor);
     std::move(of_scene.begin(), of_scene.end(), std::back_inserter(results));
-    if (options.json && !json_only) write_json(*options.json, machine, results);
+    // After each scene, so that what was measured is kept if a later one fails.
+    if (json) json->write(to_json(machine, results));
   }
 
-  if (json_only) {
-    std::cout << to_json(machine, results) << std::flush;
-    if (!std::cout) throw UsageError("--json: cannot write to standard output");
-  } else {
+  if (json_only)
+    std::cout << to_json(machine, results);
+  else
     print_results(std::cout, options, results);
-  }
   return std::any_of(results.begin(), results.end(), failed) ? check_failed : done;
 }
 

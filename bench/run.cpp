@@ -226,7 +226,7 @@ std::vector<Result> run_scene(const scene::SceneInfo& info, const Options& optio
                               const cpu::Executor& executor) {
   const scene::Mesh mesh = scene::load_mesh(info.path);
   const TriangleView triangles = mesh.view();
-  const scene::Camera camera = info.camera ? *info.camera : scene::fit_camera(scene::bounds(mesh));
+  const scene::Camera camera = scene::camera_for(info, mesh);
 
   std::unique_ptr<Checker> checker;
   if (options.check > 0) checker = make_checker(mesh, camera, options, executor.threads);

@@ -16,10 +16,10 @@
 
 #include <zkd/config.hpp>
 
+#include "command_line.hpp"
 #include "exit_status.hpp"
 #include "scene/progress.hpp"
 #include "stress/run.hpp"
-#include "usage_error.hpp"
 
 namespace zkd::stress {
 namespace {
@@ -74,28 +74,23 @@ std::optional<Options> parse(int argc, char** argv) {
       "One line a row: its number and name; ok, FAILED or skipped (why); how many cases and rays;\n"
       "answers outside the error band that are missed, phantom or of a wrong triangle; answers in\n"
       "the band; milliseconds for all of it; and the time of the builds and rays (and the memory)\n"
-      "against those of an even scene of the same size with random rays. Exit status 1: a row\n"
-      "failed.",
+      "against those of an even scene of the same size with random rays.",
       "zkd-stress"};
   bool quick = false;
   std::string list;
+  std::int64_t seed = 1;
+  std::int64_t threads = 0;
   Options options;
   app.add_flag("--quick", quick, "small scenes: all rows within a minute or two");
   app.add_option("--rows", list, "which rows, such as 1,5-9; all where nothing is said");
-  app.add_option("--seed", options.setting.seed, "another one makes other scenes and rays")
-      ->default_val(1);
-  app.add_option("--threads", options.setting.threads, "threads; 0: all")
-      ->check(CLI::Range(0, 4096))
-      ->default_val(0);
+  bench::add_whole_number(app, "--seed", seed, "another one makes other scenes and rays", 0,
+                          std::int64_t{0x7FFFFFFFFFFFFFFF});
+  bench::add_whole_number(app, "--threads", threads, "threads; 0: all", 0, 4096);
   app.set_version_flag("--version", "zkd-stress " ZKD_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& request) {
-    app.exit(request);
-    return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw UsageError(error.what());
-  }
+  app.footer(bench::exit_status_help);
+  if (!bench::parse(app, argc, argv)) return std::nullopt;
+  options.setting.seed = static_cast<std::uint64_t>(seed);
+  options.setting.threads = static_cast<int>(threads);
   options.setting.size = quick ? Size::small : Size::large;
   if (list.empty()) {
     for (const Row& row : rows()) options.rows.push_back(&row);

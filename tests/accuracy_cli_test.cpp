@@ -70,6 +70,35 @@ TEST_F(AccuracyCli, BadUsageIsOneLineThatNamesTheOption) {
   expect_error("tetra.obj --json missing-folder/out.json", 2, "--json");
   expect_error("tetra.obj --table missing-folder/out.md", 2, "--table");
   expect_error("tetra.obj --plots tetra.obj/plots", 2, "--plots");
+  expect_error("tetra.obj --measures e5 --table new.md", 2, "--table");
+  expect_error("tetra.obj --seed 9223372036854775808", 2, "--seed");
+}
+
+// An option without a value must not take the scene for one and write over it.
+TEST_F(AccuracyCli, NothingIsWrittenOverAScene) {
+  for (const char* option : {"--json= ", "--json tetra.obj ", "--table= "})
+    expect_error(std::string(option) + "tetra.obj --quick --stress 0", 2,
+                 std::string(option).substr(0, 6));
+  EXPECT_EQ(contents(folder_ / "tetra.obj"), tetrahedron);
+}
+
+// A run that fails leaves older results as they were.
+TEST_F(AccuracyCli, OlderResultsAreKeptUntilThereAreNewOnes) {
+  const std::string page = "<!-- table: begin -->\nold\n<!-- table: end -->\n";
+  write(folder_ / "page.md", page);
+  write(folder_ / "out.json", "old");
+  expect_error("missing.obj --quick --stress 0 --json out.json --table page.md", 2, "missing.obj");
+  EXPECT_EQ(contents(folder_ / "page.md"), page);
+  EXPECT_EQ(contents(folder_ / "out.json"), "old");
+  std::filesystem::remove(folder_ / "stderr");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 3) << "and no others";
+}
+
+TEST_F(AccuracyCli, OutputThatIsLostIsAnError) {
+  const Outcome outcome =
+      run("tetra.obj --quick --stress 0 --measures e3 --brute-force 2000 >/dev/full");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.err, "zkd-accuracy: error: cannot write to standard output\n");
 }
 
 TEST_F(AccuracyCli, ErrorsAloneAreMeasuredOnTheIntersectorsAlone) {
@@ -219,6 +248,7 @@ TEST_F(AccuracyCli, TableGoesBetweenTheMarkers) {
 
   write(folder_ / "without.md", "no markers\n");
   expect_error(some + "without.md", 2, "without.md");
+  EXPECT_EQ(run(some + "/dev/zero").status, 0) << "what never ends is not read";
   EXPECT_EQ(contents(folder_ / "without.md"), "no markers\n");
   ASSERT_EQ(run(some + "new.md").status, 0);
   EXPECT_TRUE(contents(folder_ / "new.md").starts_with("<!-- table: begin -->"));

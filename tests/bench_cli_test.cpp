@@ -182,6 +182,32 @@ TEST_F(BenchCli, ResultsAreKeptWhenALaterSceneFails) {
   EXPECT_EQ(json["results"][0]["scene"], "tetra");
 }
 
+// An option without a value must not take the scene for one and write over it.
+TEST_F(BenchCli, NothingIsWrittenOverAScene) {
+  expect_error("--json= tetra.obj", 2, "--json=");
+  expect_error("--json tetra.obj tetra.obj", 2, "--json");
+  EXPECT_EQ(contents(folder_ / "tetra.obj"), tetrahedron);
+}
+
+TEST_F(BenchCli, OlderResultsAreKeptUntilThereAreNewOnes) {
+  write(folder_ / "broken.obj", "v 0 0 0\nf 1 2 9\n");
+  write(folder_ / "out.json", "old");
+  expect_error("broken.obj --json out.json", 2, "broken.obj");
+  EXPECT_EQ(contents(folder_ / "out.json"), "old");
+}
+
+TEST_F(BenchCli, OutputThatIsLostIsAnError) {
+  const Outcome outcome = run("--list >/dev/full");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.err, "zkd-bench: error: cannot write to standard output\n");
+}
+
+// Every coordinate is a float, but a camera that has all of it in view is not.
+TEST_F(BenchCli, SceneThatNoCameraSeesIsNamed) {
+  write(folder_ / "huge.obj", "v -3e38 0 0\nv 3e38 0 0\nv 0 3e38 3e38\nf 1 2 3\n");
+  expect_error("huge.obj" + std::string(quick), 2, "huge.obj: no camera");
+}
+
 TEST_F(BenchCli, TimeLimitLeavesOutScenesAndSaysWhich) {
   write(folder_ / "second.obj", tetrahedron);
   const Outcome outcome =

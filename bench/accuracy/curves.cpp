@@ -171,9 +171,11 @@ double cost_of(const Point& point, std::uint64_t rays) {
 }
 
 void mark_pareto(std::vector<Point>& points) {
-  std::uint64_t rays = 1;
-  for (const Point& point : points) rays = std::max(rays, point.score.total().rays);
   for (Point& point : points) {
+    // Of the same rays some settings answer only a part.
+    std::uint64_t rays = 1;
+    for (const Point& other : points)
+      if (other.rays == point.rays) rays = std::max(rays, other.score.total().rays);
     point.pareto = std::none_of(points.begin(), points.end(), [&](const Point& other) {
       if (other.rays != point.rays || other.cuda != point.cuda) return false;
       const double cost = cost_of(point, rays);

@@ -203,7 +203,7 @@ Leaks count_leaks(const std::vector<TestScene>& scenes, std::uint64_t rays, std:
       // Moeller and Trumbore's test promises no watertightness.
       entrants.push_back({setting.name, false, setting.intersector != Intersector::fast,
                           make_runner(setting, closed.mesh, executor),
-                          slow ? of_mesh / 16 : of_mesh});
+                          slow ? std::max<std::uint64_t>(of_mesh / 16, 1) : of_mesh});
     }
     if (beside.peers) {
       for (Peer& peer : make_peers(closed.mesh, executor.threads)) {

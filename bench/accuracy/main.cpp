@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <optional>
 #include <string>
@@ -20,6 +19,7 @@
 #include "exit_status.hpp"
 #include "machine.hpp"
 #include "options.hpp"
+#include "output_file.hpp"
 #include "pictures.hpp"
 #include "report.hpp"
 #include "scene/catalog.hpp"
@@ -30,17 +30,22 @@
 namespace zkd::bench::accuracy {
 namespace {
 
-std::vector<TestScene> load_scenes(const Options& options) {
+std::vector<scene::SceneInfo> find_scenes(const Options& options) {
   std::vector<scene::SceneInfo> infos;
   if (options.scenes.empty()) {
     infos = scene::paper_scenes();
     if (options.first_scene_only && infos.size() > 1) infos.resize(1);
   }
   for (const std::string& name : options.scenes) infos.push_back(scene::find_scene(name));
+  return infos;
+}
+
+std::vector<TestScene> load_scenes(const std::vector<scene::SceneInfo>& infos,
+                                   const Options& options) {
   std::vector<TestScene> scenes;
   for (const scene::SceneInfo& info : infos) {
     TestScene loaded{info.name, info.stand_in, false, scene::load_mesh(info.path), {}};
-    loaded.camera = info.camera ? *info.camera : scene::fit_camera(scene::bounds(loaded.mesh));
+    loaded.camera = scene::camera_for(info, loaded.mesh);
     scenes.push_back(std::move(loaded));
   }
   if (options.stress > 0) {
@@ -80,12 +85,6 @@ void measure_scene(const TestScene& scene, const Options& options, const cpu::Ex
   }
 }
 
-void write(const std::filesystem::path& path, const std::string& option, const std::string& text) {
-  std::ofstream file(path, std::ios::trunc);
-  file << text << std::flush;
-  if (!file) throw UsageError(option + ": cannot write " + path.string());
-}
-
 void make_plots(const std::filesystem::path& folder) {
   std::string program = ZKD_ACCURACY_PLOT;
   std::string argument = folder.string();
@@ -114,8 +113,10 @@ int run(const Options& options) {
 
   // Before anything is measured, so that a bad path costs no minutes.
   const bool json_only = options.json && *options.json == "-";
-  if (options.json && !json_only) write(*options.json, "--json", to_json(report, options));
-  if (options.table) write_table(*options.table, "");
+  std::optional<OutputFile> json_file;
+  std::optional<TableFile> table;
+  if (options.json && !json_only) json_file.emplace("--json", *options.json);
+  if (options.table) table.emplace(*options.table);
   if (options.plots) {
     std::error_code error;
     std::filesystem::create_directories(*options.plots, error);
@@ -124,7 +125,10 @@ int run(const Options& options) {
     }
   }
 
-  const std::vector<TestScene> scenes = load_scenes(options);
+  const std::vector<scene::SceneInfo> infos = find_scenes(options);
+  for (const scene::SceneInfo& info : infos)
+    if (json_file) json_file->must_not_be(info.path);
+  const std::vector<TestScene> scenes = load_scenes(infos, options);
   for (const TestScene& scene : scenes) report.scenes.push_back(scene.name);
   const auto asked = [&](Measure measure) { return options.measures.contains(measure); };
   if (asked(Measure::curves) || asked(Measure::errors) || asked(Measure::e6) || options.plots) {
@@ -141,19 +145,17 @@ int run(const Options& options) {
     report.e7 = compare_hashes(scenes, options.meshes, options.seed, beside.cuda);
 
   const std::string json = to_json(report, options);
-  if (options.json && !json_only) write(*options.json, "--json", json);
-  if (options.table) write_table(*options.table, pareto_table(report));
+  if (json_file) json_file->write(json);
+  if (table) table->write(pareto_table(report));
   if (options.plots) {
     write_vertex_leaks(*options.plots, 256, options.seed, executor);
-    write(*options.plots / "results.json", "--plots", json);
+    OutputFile("--plots", *options.plots / "results.json").write(json);
     make_plots(*options.plots);
   }
-  if (json_only) {
-    std::cout << json << std::flush;
-    if (!std::cout) throw UsageError("--json: cannot write to standard output");
-  } else {
+  if (json_only)
+    std::cout << json;
+  else
     print(std::cout, report);
-  }
   return report.failures().empty() ? done : check_failed;
 }
 

@@ -152,6 +152,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   options.meshes = static_cast<std::uint64_t>(chosen("--meshes", &Preset::meshes));
   options.seed = static_cast<std::uint64_t>(seed);
   options.threads = static_cast<int>(threads);
+  if (app.count("--table") > 0 && !options.measures.contains(Measure::curves))
+    throw UsageError("--table: shows curves, which --measures leaves out");
   options.backend = value_named(all_backends, "--backend", backend);
   options.peers = peers == "embree";
   options.first_scene_only = quick;

@@ -3,6 +3,7 @@
 // What a run of zkd-accuracy found out: plain data between measuring and telling.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "curves.hpp"
 #include "leaks.hpp"
 #include "options.hpp"
+#include "output_file.hpp"
 #include "results.hpp"
 #include "trees.hpp"
 
@@ -62,8 +64,19 @@ void print(std::ostream& out, const Report& report);
 /// zkd as it comes, the literal tree and Embree always. Markdown.
 [[nodiscard]] std::string pareto_table(const Report& report);
 
-/// Writes `table` between the markers `<!-- table: begin -->` and `<!-- table: end -->` of a file
-/// that has them, or into a new file, with markers. Throws UsageError where neither can be.
-void write_table(const std::filesystem::path& file, const std::string& table);
+/// A document with markers, `<!-- table: begin -->` and `<!-- table: end -->`, or a new file, which
+/// gets them. As it was until write().
+class TableFile {
+ public:
+  /// Throws UsageError for a file that cannot be written, or has no markers.
+  explicit TableFile(const std::filesystem::path& file);
+  /// Puts the table between the markers.
+  void write(const std::string& table) const;
+
+ private:
+  OutputFile file_;
+  std::string before_;
+  std::string after_;
+};
 
 }  // namespace zkd::bench::accuracy

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "report.hpp"
+#include "usage_error.hpp"
 
 namespace zkd::bench::accuracy {
 namespace {
@@ -74,11 +75,13 @@ std::string pareto_table(const Report& report) {
   return out.str();
 }
 
-void write_table(const std::filesystem::path& file, const std::string& table) {
+TableFile::TableFile(const std::filesystem::path& file) : file_("--table", file) {
   std::string document = std::string(begin_marker) + "\n" + end_marker + "\n";
-  if (std::filesystem::exists(file)) {
+  // What cannot be replaced, such as a pipe, might never end.
+  if (file_.is_replaced() && std::filesystem::exists(file)) {
     std::ifstream in(file, std::ios::binary);
     document.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+    if (!in) throw UsageError("--table: cannot read " + file.string());
   }
   const std::size_t begin = document.find(begin_marker);
   const std::size_t end = begin == std::string::npos ? begin : document.find(end_marker, begin);
@@ -86,11 +89,12 @@ void write_table(const std::filesystem::path& file, const std::string& table) {
     throw UsageError("--table: " + file.string() + " has no lines '" + begin_marker + "' and '" +
                      end_marker + "' to write between");
   }
-  const std::size_t inside = begin + std::string(begin_marker).size();
-  document.replace(inside, end - inside, "\n\n" + table + "\n");
-  std::ofstream out(file, std::ios::trunc | std::ios::binary);
-  out << document << std::flush;
-  if (!out) throw UsageError("--table: cannot write " + file.string());
+  before_ = document.substr(0, begin + std::string(begin_marker).size());
+  after_ = document.substr(end);
+}
+
+void TableFile::write(const std::string& table) const {
+  file_.write(before_ + "\n\n" + table + "\n" + after_);
 }
 
 }  // namespace zkd::bench::accuracy

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -14,6 +15,16 @@
 #include "scene/unpack.hpp"
 
 namespace zkd::scene {
+
+Camera camera_for(const SceneInfo& scene, const Mesh& mesh) {
+  if (scene.camera) return *scene.camera;
+  const Camera camera = fit_camera(bounds(mesh));
+  for (int a = 0; a < 3; ++a)
+    if (!std::isfinite(camera.eye[a]))
+      throw LoadError(scene.path.string() +
+                      ": no camera can see all of it: that would be farther away than a float is");
+  return camera;
+}
 namespace {
 
 namespace fs = std::filesystem;

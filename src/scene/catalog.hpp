@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "scene/camera.hpp"
+#include "scene/mesh.hpp"
 
 namespace zkd::scene {
 
@@ -22,8 +23,12 @@ struct SceneInfo {
   std::string paper_scene;            ///< `Bunny`, ... as in the paper's table; empty if not in it
   std::uint64_t paper_triangles = 0;  ///< triangles in the paper's table; 0 if not in it
   double paper_ms = 0.0;              ///< the paper's build time on a GTX 580; 0 if not in it
-  std::optional<Camera> camera;       ///< from the manifest; otherwise use fit_camera
+  std::optional<Camera> camera;       ///< from the manifest; see camera_for
 };
+
+/// The scene's camera, or one that has all of `mesh` in view. Throws LoadError where that would
+/// stand beyond the range of float.
+[[nodiscard]] Camera camera_for(const SceneInfo& scene, const Mesh& mesh);
 
 /// The names find_scene knows, whether or not their files are here.
 [[nodiscard]] const std::vector<std::string>& known_scenes();
