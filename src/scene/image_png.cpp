@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// PNG through OpenImageIO.
-#include <OpenImageIO/imageio.h>
+// PNG through OpenImageIO, which is loaded when the first picture is written: with all that it is
+// linked to, that takes longer than many a run of a tool.
+#include <dlfcn.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +13,23 @@
 #include <vector>
 
 #include "scene/image.hpp"
+#include "scene/png_writer.hpp"
 
 namespace zkd::scene {
 namespace {
+
+using Writer = decltype(&zkd_write_png);
+
+/// Stays loaded. Throws std::runtime_error.
+Writer png_writer() {
+  static const Writer writer = [] {
+    void* const library = dlopen(ZKD_PNG_WRITER, RTLD_NOW | RTLD_LOCAL);
+    void* const found = library != nullptr ? dlsym(library, "zkd_write_png") : nullptr;
+    if (found == nullptr) throw std::runtime_error(dlerror());
+    return reinterpret_cast<Writer>(found);
+  }();
+  return writer;
+}
 
 /// [0, 1], NaN as 0.
 float clamped(float x) { return x > 0.0F ? std::min(x, 1.0F) : 0.0F; }
@@ -48,18 +63,9 @@ void write_png(const std::filesystem::path& file, unsigned width, unsigned heigh
     for (int channel = 0; channel < 3; ++channel) pixels.push_back(to_srgb(colour[channel]));
   }
 
-  const auto fail = [&file](const std::string& words) {
-    const std::size_t end = words.find('\n');
-    throw std::runtime_error(file.string() + ": cannot be written: " + words.substr(0, end));
-  };
-  // By format, not by name: the file is a PNG whatever it is called.
-  const auto output = OIIO::ImageOutput::create("png");
-  if (!output) fail(OIIO::geterror());
-  OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  if (!output->open(file.string(), spec)) fail(output->geterror());
-  if (!output->write_image(OIIO::TypeDesc::UINT8, pixels.data())) fail(output->geterror());
-  if (!output->close()) fail(output->geterror());
+  char error[256] = "";
+  if (!png_writer()(file.c_str(), width, height, pixels.data(), error, sizeof error))
+    throw std::runtime_error(file.string() + ": cannot be written: " + error);
 }
 
 }  // namespace zkd::scene
