@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -158,9 +157,8 @@ TEST(TreeBuild, OneAndTwoTriangles) {
   }
 }
 
-// Bounded: a quadratic build would take hours.
+// Bounded: a quadratic build would take hours, and CTest would end it.
 TEST(TreeBuild, AMillionAlike) {
-  const auto start = std::chrono::steady_clock::now();
   for (const References references : {References::once, References::budget, References::all}) {
     const scene::Mesh identical = scene::identical(1000000);
     const test::PlatformTree tree(identical.view(),
@@ -181,8 +179,6 @@ TEST(TreeBuild, AMillionAlike) {
         << "equal codes that cannot be told apart stay together";
     EXPECT_EQ(same.view().reference_count() + same.statistics().skipped_zero_area, 1000000u);
   }
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  EXPECT_LT(seconds.count(), 60.0);
 }
 
 // At the corner of the stadium, where floats are fine enough for the model at any ratio.
