@@ -25,6 +25,7 @@ Camera camera_for(const SceneInfo& scene, const Mesh& mesh) {
                       ": no camera can see all of it: that would be farther away than a float is");
   return camera;
 }
+
 namespace {
 
 namespace fs = std::filesystem;

@@ -20,12 +20,11 @@ namespace {
 
 using Writer = decltype(&zkd_write_png);
 
-/// Stays loaded. Throws std::runtime_error.
+/// Stays loaded; null if it could not be.
 Writer png_writer() {
   static const Writer writer = [] {
     void* const library = dlopen(ZKD_PNG_WRITER, RTLD_NOW | RTLD_LOCAL);
     void* const found = library != nullptr ? dlsym(library, "zkd_write_png") : nullptr;
-    if (found == nullptr) throw std::runtime_error(dlerror());
     return reinterpret_cast<Writer>(found);
   }();
   return writer;
@@ -64,7 +63,11 @@ void write_png(const std::filesystem::path& file, unsigned width, unsigned heigh
   }
 
   char error[256] = "";
-  if (!png_writer()(file.c_str(), width, height, pixels.data(), error, sizeof error))
+  const Writer write = png_writer();
+  if (write == nullptr)
+    throw std::runtime_error(file.string() + ": cannot be written: " ZKD_PNG_WRITER
+                             " could not be loaded");
+  if (!write(file.c_str(), width, height, pixels.data(), error, sizeof error))
     throw std::runtime_error(file.string() + ": cannot be written: " + error);
 }
 
