@@ -66,7 +66,7 @@ void write_png(const std::filesystem::path& file, unsigned width, unsigned heigh
   const Writer write = png_writer();
   if (write == nullptr)
     throw std::runtime_error(file.string() + ": cannot be written: " ZKD_PNG_WRITER
-                             " could not be loaded");
+                                             " could not be loaded");
   if (!write(file.c_str(), width, height, pixels.data(), error, sizeof error))
     throw std::runtime_error(file.string() + ": cannot be written: " + error);
 }
