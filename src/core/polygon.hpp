@@ -53,8 +53,8 @@ struct PolygonOf {
     }
     lo = hi = corner[0];
     for (std::uint32_t i = 1; i < 3; ++i) {
-      lower(lo, corner[i]);
-      raise(hi, corner[i]);
+      keep_least(lo, corner[i]);
+      keep_most(hi, corner[i]);
     }
     corners = 3;
   }
@@ -86,14 +86,14 @@ struct PolygonOf {
     meet(from.corner[last], from.corner[last + 1 == n ? 0 : last + 1], a, h, end);
     Lanes least = corner[0];
     Lanes most = corner[0];
-    lower(least, end);
-    raise(most, end);
+    keep_least(least, end);
+    keep_most(most, end);
     std::uint32_t at = first;
     for (std::uint32_t i = 1; i <= run; ++i) {
       const Lanes point = from.corner[at];
       corner[i] = point;
-      lower(least, point);
-      raise(most, point);
+      keep_least(least, point);
+      keep_most(most, point);
       at = at + 1 == n ? 0 : at + 1;
     }
     corner[run + 1] = end;
@@ -108,7 +108,8 @@ struct PolygonOf {
   /// Where the edge from a corner that is kept to one that is not meets the plane.
   ZKD_HOST_DEVICE static void meet(const Lanes& kept, const Lanes& gone, std::uint32_t axis,
                                    double h, Lanes& at) {
-    go(kept, gone, (h - kept[axis]) / (gone[axis] - kept[axis]), at);
+    const double s = (h - kept[axis]) / (gone[axis] - kept[axis]);
+    at = kept + s * (gone - kept);
     at[axis] = h;
   }
   ZKD_HOST_DEVICE void copy(const PolygonOf& from) {

@@ -55,7 +55,6 @@ struct ValidateTriangle {
     const Fault fault = lanes.is_surely_valid() ? Fault::none : fault_of(corners);
     if (fault == Fault::none) {
       ++report.valid;
-      // Zeros lose their signs there, so that equal coordinates have equal bits.
       lanes.write_box(box);
       include(report.bounds, box);
       return;
