@@ -52,7 +52,7 @@ if(ZKD_CUDA_ARCHITECTURES STREQUAL "local")
     set(zkd_cuda_architectures ${CMAKE_MATCH_1}${CMAKE_MATCH_2}-real)
   else()
     list(GET zkd_cuda_architectures 0 oldest)
-    set(zkd_cuda_architectures ${oldest} ${newest}-virtual)
+    string(REPLACE -real "" zkd_cuda_architectures ${oldest})  # its PTX runs on later ones
   endif()
 elseif(NOT ZKD_CUDA_ARCHITECTURES STREQUAL "all")
   set(zkd_cuda_architectures "${ZKD_CUDA_ARCHITECTURES}")

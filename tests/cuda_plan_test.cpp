@@ -172,11 +172,14 @@ TEST(CudaPlan, AnUnusedWorkspaceIsLeftAlone) {
 
 TEST(CudaPlan, PassesDependOnCountsAndOptions) {
   for (const std::uint32_t n : {1u, 3u, 1000u}) {
+    const std::vector<scene::Mesh> scenes = scenes_of(n);
+    std::size_t plan = 0;
     for (const BuildOptions& options : plans()) {
       std::vector<Launch> want;
-      std::uint64_t seed = 0;
-      for (const scene::Mesh& mesh : scenes_of(n)) {
-        Machine machine(++seed);
+      // The soup and one of the others, in turn.
+      for (const std::size_t number : {std::size_t{0}, 1 + plan++ % (scenes.size() - 1)}) {
+        const scene::Mesh& mesh = scenes.at(number);
+        Machine machine(number);
         const Triangles triangles(machine, mesh);
         machine.stream.forget();
         simulated::Tree tree = build(machine.executor(), triangles.view(), options);

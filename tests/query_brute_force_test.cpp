@@ -81,7 +81,7 @@ class QueryBruteForce : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
   Count count;
-  for (std::uint64_t seed = 0; seed < 7; ++seed) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
     for (const References references : {References::once, References::budget, References::all}) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references));
@@ -94,11 +94,8 @@ TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
         rays.insert(rays.end(), more.begin(), more.end());
       }
       for (const Intersector intersector : test::intersectors()) {
-        // The one that most will use has the most tries, the slowest the fewest.
-        const std::uint64_t every = intersector == Intersector::watertight ? 1
-                                    : intersector == Intersector::exact    ? 7
-                                                                           : 5;
-        if (seed % every != 0) continue;
+        // The one that most will use has the most tries.
+        if (seed != 0 && intersector != Intersector::watertight) continue;
         expect_same_answers(tree, m.mesh.view(), rays, count, intersector);
         if (testing::Test::HasFatalFailure()) return;
       }

@@ -271,7 +271,8 @@ void grazing(const Setting& setting, const Yield& yield) {
 // A plane through whole points, tiled by triangles with whole corners, and rays within it. In the
 // first three kinds the plane is parallel to an axis and nothing is rounded: no intersector may
 // hit. In oblique planes a sheared corner is rounded, and a hit is in the band. No filter decides
-// here: every triangle on the way is exact arithmetic's, so the plane is not large.
+// here: every triangle on the way is exact arithmetic's, so the plane is not large and the oracle
+// sees some of its rays.
 void exactly_coplanar(const Setting& setting, const Yield& yield) {
   for (std::uint64_t i = 0; i < setting.pick(8u, 24u); ++i) {
     Random random(1000 * setting.seed + i);
@@ -305,6 +306,7 @@ void exactly_coplanar(const Setting& setting, const Yield& yield) {
     }
     Case made = hard_case("plane " + std::to_string(i), std::move(mesh), some_options(setting),
                           setting.pick(600u, 10000u));
+    made.oracle_rays = setting.pick(0u, 1000u);
     if (i % 4 < 3) made.hits = Case::Hits::none;
     made.rays = [=](const Mesh&, const TreeView&, std::uint32_t count, std::uint64_t seed) {
       Random dice(seed);

@@ -50,7 +50,8 @@ Case top_of_fan(std::uint32_t triangles, const Setting& setting) {
 
 void fans(const Setting& setting, const Yield& yield) {
   for (const std::uint32_t triangles :
-       {4u, 5u, 64u, 1000u, setting.pick(4000u, 30000u), setting.pick(8000u, 1000000u)}) {
+       {4u, 5u, 64u, setting.pick(300u, 1000u), setting.pick(1000u, 30000u),
+        setting.pick(2500u, 1000000u)}) {
     yield(top_of_fan(triangles, setting));
     Case made =
         hard_case("all of " + std::to_string(triangles), scene::fan(triangles),

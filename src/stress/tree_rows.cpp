@@ -185,8 +185,8 @@ void real_run(std::uint32_t count, std::uint64_t bytes, const Setting& setting,
 
 void counts_past_32_bits(const Setting& setting, const Yield& yield) {
   yield(own_case("mocked counts", mocked_counts));
-  for (const std::uint32_t count : {2000u, 20000u, 100000u}) {
-    if (setting.size == Size::small && count > 2000) break;
+  for (const std::uint32_t count : {1000u, 20000u, 100000u}) {
+    if (setting.size == Size::small && count > 1000) break;
     yield(own_case(std::to_string(count) + " triangles, each in every cell",
                    [count](const Setting& of, Findings& findings) {
                      // Seen: 0.28 of the square of the count.

@@ -80,7 +80,7 @@ elseif(CASE STREQUAL "add_subdirectory")
   # Another way of building all of it: shared, without optimisation, assertions on.
   configure_and_build("${sources}/add_subdirectory" "-DZKD_SOURCE_DIR=${ZKD_SOURCE_DIR}"
                       -DBUILD_SHARED_LIBS=ON -DCMAKE_BUILD_TYPE=Debug
-                      "-DZKD_CUDA_ARCHITECTURES=75-real"
+                      "-DZKD_CUDA_ARCHITECTURES=75-virtual"
                       "-DCMAKE_EXE_LINKER_FLAGS=-Wl,--as-needed")
   run_bits()
   if(EXISTS "${build}/either")

@@ -38,10 +38,8 @@
 #include <zkd/tree.hpp>
 
 #include "core/compress.hpp"
-#include "core/stages/instantiate.hpp"
 #include "core/verbs.hpp"
 #include "cuda/build_steps.hpp"
-#include "cuda/stage_backend.hpp"
 #include "cuda/transfer.hpp"
 #include "support/random.hpp"
 #include "support/simulated_memory.hpp"
@@ -465,15 +463,10 @@ inline Tree to_device(const Executor& executor, const zkd::Tree& tree,
 
 }  // namespace zkd::simulated
 
-template <>
-struct zkd::core::BackendOf<zkd::simulated::Executor> {
-  using type = cuda::StageBackend<simulated::Device>;
-};
-
 namespace zkd {
 
-// As for cuda::Executor: see zkd/cuda/build.hpp and zkd/cuda/query.hpp. Builds are in
-// simulated_device.cpp, since their passes take long to compile.
+// As for cuda::Executor: see zkd/cuda/build.hpp and zkd/cuda/query.hpp. Builds and
+// single stages are compiled once, in simulated_*.cpp: their passes take long.
 
 simulated::Tree build(const simulated::Executor& executor, const TriangleView& triangles,
                       const BuildOptions& options = {});
