@@ -58,19 +58,33 @@ class TriangleLanesOf {
 
   /// Of a valid triangle. Zeros lose their signs, so that equal coordinates have equal bits.
   [[gnu::always_inline]] ZKD_HOST_DEVICE void write_box(Box& box) const {
-    FloatLanes least = p_[0];
-    FloatLanes most = p_[0];
-    for (int corner = 1; corner < 3; ++corner) {
-      keep_least(least, p_[corner]);
-      keep_most(most, p_[corner]);
-    }
+    FloatLanes least;
+    FloatLanes most;
+    find_box(least, most);
     for (int a = 0; a < 3; ++a) {
       box.lo[a] = least[a] + 0.0F;
       box.hi[a] = most[a] + 0.0F;
     }
   }
 
+  /// Whether a side of that box is longer.
+  [[nodiscard, gnu::always_inline]] ZKD_HOST_DEVICE bool has_side_above(float length) const {
+    FloatLanes least;
+    FloatLanes most;
+    find_box(least, most);
+    const FloatLanes sides = most - least;
+    return larger(sides[0], larger(sides[1], sides[2])) > length;
+  }
+
  private:
+  [[gnu::always_inline]] ZKD_HOST_DEVICE void find_box(FloatLanes& least, FloatLanes& most) const {
+    least = most = p_[0];
+    for (int corner = 1; corner < 3; ++corner) {
+      keep_least(least, p_[corner]);
+      keep_most(most, p_[corner]);
+    }
+  }
+
   FloatLanes p_[3];
 };
 

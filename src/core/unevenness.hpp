@@ -15,6 +15,7 @@
 // what makes the measure cheap.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include <zkd/geometry.hpp>
@@ -44,24 +45,30 @@ inline constexpr int few_levels = 5;
 /// which are told by their longest sides: none.
 struct ValidateAndMeasure {
   ValidateTriangle validate;
-  /// Square of a side that is too short, by the part of the scene seen so far: which ones are left
-  /// out depends on the order, but none that is_uneven() counts.
-  double too_short = 0.0;
+  /// A side that is too short, by the part of the scene seen so far: which ones are left out
+  /// depends on the order, but none that is_uneven() counts.
+  float too_short = 0.0F;
   std::uint32_t measured = 0;
 
   ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t triangle, ValidationReport& report) {
-    validate(triangle, report);
-    const Box& box = validate.boxes[triangle];
-    float side = 0.0F;  // of an empty box they are negative
-    for (int a = 0; a < 3; ++a) side = larger(side, box.hi[a] - box.lo[a]);
-    const double longest = static_cast<double>(side);
-    if (!(longest * longest > too_short)) return SizeClasses::count;
-    // Half the surface is at most three squares of the longest side, and bounds only grow.
-    if (measured++ % 16 == 0)
-      too_short = half_area(report.bounds) /
-                  static_cast<double>(validate.triangles.triangle_count) *
-                  (power_of_two(few_levels) / 3.0);
-    return SizeClasses::of(half_area(box));
+    bool is_long = false;
+    validate(triangle, report, [this, &is_long](const TriangleLanes& lanes) {
+      is_long = lanes.has_side_above(too_short);
+    });
+    if (!is_long) return SizeClasses::count;
+    if (measured++ % 16 == 0) too_short = side_of_few_levels(report.bounds);
+    return SizeClasses::of(half_area(validate.boxes[triangle]));
+  }
+
+ private:
+  /// Half the surface is at most three squares of the longest side, and bounds only grow. Rounding,
+  /// of this and of a side, is far less than the part that is taken off; a side that no float holds
+  /// is longer than any.
+  [[nodiscard]] ZKD_HOST_DEVICE float side_of_few_levels(const Box& bounds) const {
+    const double half = half_area(bounds) / static_cast<double>(validate.triangles.triangle_count) *
+                        power_of_two(few_levels);
+    constexpr double float_max = 3.4028234663852886e38;
+    return static_cast<float>(smaller(0.999 * ::sqrt(half / 3.0), float_max));
   }
 };
 

@@ -34,12 +34,18 @@ struct ValidationReport {
   }
 };
 
-/// One triangle: writes its box (empty if left out) and adds to a report.
+/// One triangle: writes its box (empty if left out) and adds to a report. Calls look(lanes) if it
+/// is valid.
 struct ValidateTriangle {
   TriangleView triangles;
   Box* boxes;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {
+    (*this)(triangle, report, [](const TriangleLanes&) {});
+  }
+  template <class Look>
+  ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report,
+                                  Look look) const {
     Box& box = boxes[triangle];
     bool in_range = true;
     if (triangles.indices != nullptr)
@@ -57,6 +63,7 @@ struct ValidateTriangle {
       ++report.valid;
       lanes.write_box(box);
       include(report.bounds, box);
+      look(lanes);
       return;
     }
     box = Box{};
