@@ -6,6 +6,7 @@
 #include <zkd/build.hpp>            // IWYU pragma: export
 #include <zkd/config.hpp>           // IWYU pragma: export
 #include <zkd/cpu/executor.hpp>     // IWYU pragma: export
+#include <zkd/cpu/plane_tree.hpp>   // IWYU pragma: export
 #include <zkd/cpu/wide_tree.hpp>    // IWYU pragma: export
 #include <zkd/error.hpp>            // IWYU pragma: export
 #include <zkd/geometry.hpp>         // IWYU pragma: export

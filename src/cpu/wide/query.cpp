@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Queries through a wide tree: single rays, and spans of rays on all threads.
-#include <algorithm>
+#include <type_traits>
 
 #include <zkd/cpu/wide_tree.hpp>
 #include <zkd/traversal/ray.hpp>
 
-#include "cpu/float_environment.hpp"
-#include "cpu/instruction_set.hpp"
 #include "cpu/rays.hpp"
-#include "cpu/threads.hpp"
 #include "cpu/wide/avx2.hpp"
 #include "cpu/wide/portable.hpp"
 #include "cpu/wide/walk.hpp"
@@ -17,8 +14,9 @@
 namespace zkd::cpu {
 namespace {
 
-template <bool any, class Instructions, class Intersect>
+template <bool any, class Intersect, bool avx2>
 inline auto trace(const WideTreeView& tree, const Ray& ray, TraversalCost* cost) {
+  using Instructions = std::conditional_t<avx2, Avx2Wide, PortableWide>;
   using Decide = typename Instructions::template Decide<Intersect>;
   using Lanes = typename Instructions::template Lanes<Intersect>;
   const core::PreparedRay prepared(TreeView{tree.header}, ray, Intersect::hit_distance);
@@ -30,70 +28,41 @@ inline auto trace(const WideTreeView& tree, const Ray& ray, TraversalCost* cost)
   return typename Decide::Candidate{};
 }
 
-/// read(candidate) of the walk of one ray.
-template <bool any, class Read>
-auto trace_one(const WideTreeView& tree, const Ray& ray, Intersector intersector,
-               Read read) noexcept {
-  const FloatEnvironment environment;
-  return with_intersector(intersector, [&]<class Intersect>() {
-    if (use_avx2(InstructionSet::automatic)) {
-      const auto body = [&](const Ray& one) {
-        return read(trace<any, Avx2Wide, Intersect>(tree, one, nullptr));
-      };
-      return call_avx2(body, ray);
-    }
-    return read(trace<any, PortableWide, Intersect>(tree, ray, nullptr));
-  });
-}
-
-/// write(i, candidate) for the walk of every ray i.
-template <bool any, class Write>
-void trace_all(const Executor& executor, const WideTreeView& tree, std::span<const Ray> rays,
-               std::size_t count, std::span<TraversalCost> costs, Intersector intersector,
-               Write write) noexcept {
-  if (!costs.empty()) count = std::min(count, costs.size());
-  const Threads threads(executor);
-  with_intersector(intersector, [&]<class Intersect>() {
-    const auto trace_with = [=]<class Instructions>(std::size_t i) {
-      write(i, trace<any, Instructions, Intersect>(tree, rays[i],
-                                                   costs.empty() ? nullptr : &costs[i]));
-    };
-    if (threads.avx2())
-      for_each_ray(threads, count, rays_at_once,
-                   [=](std::size_t i) { trace_with.template operator()<Avx2Wide>(i); });
-    else
-      for_each_ray(threads, count, rays_at_once,
-                   [=](std::size_t i) { trace_with.template operator()<PortableWide>(i); });
-  });
-}
-
 }  // namespace
 
 std::optional<Hit> closest_hit(const WideTreeView& tree, const Ray& ray,
                                Intersector intersector) noexcept {
-  const Hit hit = trace_one<false>(tree, ray, intersector,
-                                   [](const auto& found) { return core::to_hit(found); });
+  const Hit hit = trace_one(intersector, [&]<class Intersect, bool avx2>() {
+    return core::to_hit(trace<false, Intersect, avx2>(tree, ray, nullptr));
+  });
   if (hit.triangle == no_triangle) return std::nullopt;
   return hit;
 }
 
 bool any_hit(const WideTreeView& tree, const Ray& ray, Intersector intersector) noexcept {
-  return trace_one<true>(tree, ray, intersector, [](const auto& found) { return found.found(); });
+  return trace_one(intersector, [&]<class Intersect, bool avx2>() {
+    return trace<true, Intersect, avx2>(tree, ray, nullptr).found();
+  });
 }
 
 void closest_hit(const Executor& executor, const WideTreeView& tree, std::span<const Ray> rays,
                  std::span<Hit> hits, std::span<TraversalCost> costs,
                  Intersector intersector) noexcept {
-  trace_all<false>(executor, tree, rays, std::min(rays.size(), hits.size()), costs, intersector,
-                   [hits](std::size_t i, const auto& found) { hits[i] = core::to_hit(found); });
+  trace_all(executor, rays_with_places(rays.size(), hits.size(), costs), intersector,
+            [=]<class Intersect, bool avx2>(std::size_t i) {
+              hits[i] =
+                  core::to_hit(trace<false, Intersect, avx2>(tree, rays[i], cost_of(costs, i)));
+            });
 }
 
 void any_hit(const Executor& executor, const WideTreeView& tree, std::span<const Ray> rays,
              std::span<std::uint8_t> occluded, std::span<TraversalCost> costs,
              Intersector intersector) noexcept {
-  trace_all<true>(
-      executor, tree, rays, std::min(rays.size(), occluded.size()), costs, intersector,
-      [occluded](std::size_t i, const auto& found) { occluded[i] = found.found() ? 1 : 0; });
+  trace_all(executor, rays_with_places(rays.size(), occluded.size(), costs), intersector,
+            [=]<class Intersect, bool avx2>(std::size_t i) {
+              const auto found = trace<true, Intersect, avx2>(tree, rays[i], cost_of(costs, i));
+              occluded[i] = found.found() ? 1 : 0;
+            });
 }
 
 }  // namespace zkd::cpu
