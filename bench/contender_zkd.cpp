@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include <zkd/build.hpp>
+#include <zkd/cpu/plane_tree.hpp>
 #include <zkd/cpu/wide_tree.hpp>
 
 #include "literal_walk.hpp"
@@ -29,6 +30,7 @@ class CpuContender final : public ZkdContender {
     const Stopwatch watch;
     tree_ = zkd::build(executor_, triangles_, options_);
     if (layout_ == Layout::wide) wide_ = cpu::widen(executor_, tree_.view(), triangles_);
+    if (layout_ == Layout::planes) planes_ = cpu::strip_boxes(executor_, tree_);
     const double whole = watch.ms();
     if (layout_ != Layout::literal) return whole;
     return whole - tree_.statistics().stage_ms[static_cast<std::size_t>(Stage::tight_boxes)];
@@ -51,6 +53,7 @@ class CpuContender final : public ZkdContender {
   void clear() override {
     tree_ = Tree();
     wide_ = cpu::WideTree();
+    planes_ = cpu::PlaneTree();
   }
 
   // Bytes, in a build whose memory is counted. `once` can be asked for beforehand; for `all` the
@@ -63,8 +66,12 @@ class CpuContender final : public ZkdContender {
     const Tree tree = zkd::build(counted, triangles_, options_);
     const cpu::WideTree wide =
         layout_ == Layout::wide ? cpu::widen(counted, tree.view(), triangles_) : cpu::WideTree();
-    // Rays need one of the two.
-    result.allocated.tree = layout_ == Layout::wide ? wide.bytes() : memory.held();
+    const cpu::PlaneTree planes =
+        layout_ == Layout::planes ? cpu::strip_boxes(counted, tree) : cpu::PlaneTree();
+    // Rays need one of them.
+    result.allocated.tree = layout_ == Layout::wide     ? wide.bytes()
+                            : layout_ == Layout::planes ? planes.bytes()
+                                                        : memory.held();
     result.allocated.workspace = memory.peak() - result.allocated.tree;
     if (tree.options().builder == Builder::morton && layout_ == Layout::binary) {
       const std::uint64_t references =
@@ -91,6 +98,8 @@ class CpuContender final : public ZkdContender {
     const Stopwatch watch;
     if (layout_ == Layout::wide)
       cpu::closest_hit(executor_, wide_.view(), rays, hits, costs, intersector_);
+    else if (layout_ == Layout::planes)
+      cpu::closest_hit(executor_, planes_.view(), triangles_, rays, hits, costs, intersector_);
     else if (layout_ == Layout::literal)
       closest_hit_literally(executor_, tree_.view(), triangles_, rays, hits, costs);
     else
@@ -108,6 +117,8 @@ class CpuContender final : public ZkdContender {
       });
     } else if (layout_ == Layout::wide)
       cpu::any_hit(executor_, wide_.view(), rays, occluded, costs, intersector_);
+    else if (layout_ == Layout::planes)
+      cpu::any_hit(executor_, planes_.view(), triangles_, rays, occluded, costs, intersector_);
     else
       zkd::any_hit(executor_, tree_.view(), triangles_, rays, occluded, costs, intersector_);
     return watch.ms();
@@ -122,7 +133,8 @@ class CpuContender final : public ZkdContender {
   Intersector intersector_;
   Layout layout_;
   Tree tree_;
-  cpu::WideTree wide_;  ///< of Layout::wide
+  cpu::WideTree wide_;     ///< of Layout::wide
+  cpu::PlaneTree planes_;  ///< of Layout::planes
   std::vector<Hit> hits_;
   std::vector<std::uint8_t> occluded_;
 };

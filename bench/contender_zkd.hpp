@@ -42,9 +42,9 @@ class ZkdContender : public Contender {
   [[nodiscard]] virtual const Tree& tree() = 0;
 };
 
-/// zkd on the CPU. With Layout::wide, builds end with a wide tree and rays go through that;
-/// Layout::literal, which knows the watertight intersector only, leaves out answers.
-/// `triangles` must outlive it.
+/// zkd on the CPU. With Layout::wide, builds end with a wide tree and rays go through that, with
+/// Layout::planes with a plane tree; Layout::literal, which knows the watertight intersector only,
+/// leaves out answers. `triangles` must outlive it.
 [[nodiscard]] std::unique_ptr<ZkdContender> cpu_contender(const cpu::Executor& executor,
                                                           const TriangleView& triangles,
                                                           const BuildOptions& options,

@@ -82,7 +82,7 @@ int run(const Options& options) {
   if (where.backend == Backend::cuda &&
       std::any_of(options.layouts.begin(), options.layouts.end(),
                   [](Layout layout) { return layout != Layout::binary; })) {
-    throw UsageError("--layout: wide and literal are for the CPU; add --backend cpu");
+    throw UsageError("--layout: wide, planes and literal are for the CPU; add --backend cpu");
   }
   const bool json_only = options.json && *options.json == "-";
   make_image_folder(options);

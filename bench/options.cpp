@@ -29,7 +29,7 @@ constexpr std::array all_invalid{InvalidTriangles::error, InvalidTriangles::skip
 constexpr std::array all_ray_kinds{RayKind::primary, RayKind::diffuse, RayKind::shadow};
 constexpr std::array all_instructions{cpu::InstructionSet::automatic, cpu::InstructionSet::portable,
                                       cpu::InstructionSet::avx2};
-constexpr std::array all_layouts{Layout::binary, Layout::wide, Layout::literal};
+constexpr std::array all_layouts{Layout::binary, Layout::wide, Layout::planes, Layout::literal};
 constexpr std::array all_peers{PeerLibrary::embree};
 
 const char* on_off(bool value) { return value ? "on" : "off"; }
@@ -40,9 +40,12 @@ bool on_or_off(const std::string& option, const std::string& value) {
   throw UsageError(option + ": '" + value + "' is not one of on, off");
 }
 
-// The poster knows one tree.
-bool is_the_posters(Builder builder, Quality quality, References references) {
-  return builder == Builder::morton && quality == Quality::fast && references == References::once;
+// The poster knows one tree, and planes alone are for strict ones.
+bool has_layout(Layout layout, Builder builder, Quality quality, References references) {
+  const bool by_codes = builder == Builder::morton && quality != Quality::high;
+  if (layout == Layout::literal)
+    return by_codes && quality == Quality::fast && references == References::once;
+  return layout != Layout::planes || !by_codes || references == References::all;
 }
 
 // What distinguishes a setting: its values on the options that were given more than one.
@@ -66,7 +69,7 @@ std::string label_of(const BuildOptions& setting, Layout layout, bool builders, 
 const char* to_string(PeerLibrary) noexcept { return "embree"; }
 
 const char* to_string(Layout layout) noexcept {
-  constexpr const char* names[] = {"binary", "wide", "literal"};
+  constexpr const char* names[] = {"binary", "wide", "planes", "literal"};
   return names[static_cast<std::size_t>(layout)];
 }
 
@@ -250,9 +253,7 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
             (one_policy != policies.front() || one_quality != qualities.front()))
           continue;
         for (const Layout one_layout : layouts) {
-          if (one_layout == Layout::literal &&
-              !is_the_posters(one_builder, one_quality, one_policy))
-            continue;
+          if (!has_layout(one_layout, one_builder, one_quality, one_policy)) continue;
           BuildOptions setting = base;
           setting.builder = one_builder;
           setting.quality = one_quality;
@@ -269,7 +270,8 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
 
   if (options.settings.empty())
     throw UsageError(
-        "--layout: literal is for --builder morton, --quality fast, --references once");
+        "--layout: literal is for --builder morton, --quality fast, --references once; planes for "
+        "--references all, --quality high, --builder sah, wu2011");
 
   options.threads = static_cast<int>(threads);
   options.instructions = value_named(all_instructions, "--instructions", instructions);

@@ -25,12 +25,12 @@ enum class RayKind : std::uint8_t { primary, diffuse, shadow };
 /// "primary", "diffuse", "shadow". Static storage.
 [[nodiscard]] const char* to_string(RayKind kind) noexcept;
 
-/// What rays are traced through: the tree as it was built, or, on the CPU, the form that
-/// cpu::widen makes of it (making that is a part of the time of a build), or the tree's planes
-/// alone, as literal_walk.hpp has it (whose boxes are no part of that time).
-enum class Layout : std::uint8_t { binary, wide, literal };
+/// What rays are traced through: the tree as it was built, or, on the CPU, the forms that
+/// cpu::widen and cpu::strip_boxes make of it (making one is a part of the time of a build), or the
+/// tree's planes as literal_walk.hpp has it (whose boxes are no part of that time).
+enum class Layout : std::uint8_t { binary, wide, planes, literal };
 
-/// "binary", "wide", "literal". Static storage.
+/// "binary", "wide", "planes", "literal". Static storage.
 [[nodiscard]] const char* to_string(Layout layout) noexcept;
 
 /// Repetitions of one measurement, milliseconds.

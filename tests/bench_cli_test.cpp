@@ -348,6 +348,20 @@ TEST_F(BenchCli, LayoutsAreMeasuredSideBySide) {
             json["results"][1]["allocated_bytes"]["tree"]);
 }
 
+TEST_F(BenchCli, PlanesAloneAreALayoutOfStrictTrees) {
+  const Json json = run_json(
+      "tetra.obj --backend cpu --layout binary,planes --references once,all" + std::string(quick));
+  ASSERT_EQ(json["results"].size(), 3u);
+  EXPECT_EQ(json["results"][2]["label"], "all planes");
+  EXPECT_EQ(json["results"][2]["trace"]["primary"]["hits"],
+            json["results"][1]["trace"]["primary"]["hits"]);
+  EXPECT_LT(json["results"][2]["allocated_bytes"]["tree"],
+            json["results"][1]["allocated_bytes"]["tree"]);
+  const Outcome none = run("tetra.obj --layout planes --references once" + std::string(quick));
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.err.find("planes for --references all"), std::string::npos) << none.err;
+}
+
 TEST_F(BenchCli, ThePosterTakenAtItsWordIsALayout) {
   const Json json = run_json(
       "tetra.obj --backend cpu --layout binary,literal --references all,once" + std::string(quick));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// References::budget and ::automatic, Quality::balanced: what each promises beyond what every tree
-// does.
+// References::budget, ::automatic and ::all, Quality::balanced: what each promises beyond what
+// every tree does.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -223,6 +223,33 @@ TEST(TreeBalanced, IsNoDeeperThanAWalkAllows) {
       }
     }
   }
+}
+
+// Triangles in one plane, each nearly as large as all of them: every cell holds nearly all, and
+// splitting a leaf again would list all of them once more for each of its cells.
+TEST(TreeAll, LeavesThatSplittingWouldNotThinStayWhole) {
+  constexpr std::uint32_t n = 600;
+  scene::Mesh mesh;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const float d = static_cast<float>(i) * 0x1p-20F;
+    mesh.positions.emplace_back(-16.0F + d, -16.0F, 0.0F);
+    mesh.positions.emplace_back(16.0F + d, -16.0F + d, 0.0F);
+    mesh.positions.emplace_back(d, 16.0F - d, 0.0F);
+    mesh.faces.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  const Tree tree = test::build(mesh.view(), {.references = References::all});
+  EXPECT_GT(tree.statistics().crowded_leaves, 0u);
+  // A leaf of the first round for every few triangles: n / 4 of them at most.
+  EXPECT_LE(tree.statistics().references, std::uint64_t{n} * n / 4);
+
+  // What splitting thins is split: the same, each a hundredth of the size.
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const glm::vec3 at(static_cast<float>(i % 25), static_cast<float>(i / 25), 0.0F);
+    for (std::uint32_t c = 0; c < 3; ++c)
+      mesh.positions[3 * i + c] = at + 0.01F * mesh.positions[3 * i + c];
+  }
+  const Tree spread = test::build(mesh.view(), {.references = References::all});
+  EXPECT_LE(spread.statistics().references, 3u * n);
 }
 
 }  // namespace

@@ -22,6 +22,7 @@
 #include "support/memory.hpp"
 #include "support/meshes.hpp"
 #include "support/rays.hpp"
+#include "support/tree_forms.hpp"
 
 namespace zkd {
 namespace {
@@ -29,14 +30,7 @@ namespace {
 using cpu::WideTree;
 using cpu::WideTreeView;
 using test::Caught;
-using test::names;
-using test::or_miss;
-using test::print;
 using test::same_bits;
-
-constexpr Intersector all_intersectors[] = {Intersector::watertight, Intersector::fast,
-                                            Intersector::single_precision,
-                                            Intersector::double_precision, Intersector::exact};
 
 BuildOptions options_for(References references, std::uint32_t leaf_size = 4) {
   BuildOptions options;
@@ -54,36 +48,6 @@ std::vector<BuildOptions> many_options() {
 
 // ---- Answers ------------------------------------------------------------------------------------
 
-// Every form of a query against a loop over all triangles and the walk of the tree.
-void expect_same_answers(const Tree& tree, const WideTree& wide, const TriangleView& triangles,
-                         const std::vector<Ray>& rays, Intersector intersector) {
-  SCOPED_TRACE(to_string(intersector));
-  const std::vector<Hit> want = test::brute_force(tree.view(), triangles, rays, {}, intersector);
-  const std::vector<Hit> narrow = test::closest(tree.view(), triangles, rays, {}, intersector);
-  for (const cpu::InstructionSet set :
-       {cpu::InstructionSet::portable, cpu::InstructionSet::automatic}) {
-    SCOPED_TRACE(cpu::to_string(set));
-    const cpu::Executor executor{.threads = 2, .instructions = set};
-    std::vector<Hit> hits(rays.size());
-    std::vector<TraversalCost> costs(rays.size());
-    cpu::closest_hit(executor, wide.view(), rays, hits, costs, intersector);
-    std::vector<std::uint8_t> occluded(rays.size());
-    cpu::any_hit(executor, wide.view(), rays, occluded, {}, intersector);
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      ASSERT_TRUE(same_bits(narrow[i], want[i])) << "the tree itself, ray " << i;
-      ASSERT_TRUE(same_bits(hits[i], want[i]))
-          << "ray " << i << " " << print(rays[i]) << ": " << print(hits[i]) << " instead of "
-          << print(want[i]);
-      ASSERT_EQ(occluded[i], test::is_hit(want[i]) ? 1 : 0) << "ray " << i << print(rays[i]);
-      ASSERT_TRUE(!test::is_hit(want[i]) || costs[i].triangle_tests > 0);
-    }
-  }
-  for (std::size_t i = 0; i < rays.size(); i += 3) {
-    ASSERT_TRUE(same_bits(or_miss(cpu::closest_hit(wide.view(), rays[i], intersector)), want[i]));
-    ASSERT_EQ(cpu::any_hit(wide.view(), rays[i], intersector), test::is_hit(want[i]));
-  }
-}
-
 class WideTreeAnswers : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(WideTreeAnswers, AreThoseOfTheTree) {
@@ -95,8 +59,9 @@ TEST_P(WideTreeAnswers, AreThoseOfTheTree) {
       const Tree tree = build(cpu::Executor{}, m.mesh.view(), options);
       const WideTree wide = cpu::widen({.threads = 2}, tree.view(), m.mesh.view());
       const std::vector<Ray> rays = scene::hard_rays(m.mesh, tree.view(), 120, seed);
-      for (const Intersector intersector : all_intersectors) {
-        expect_same_answers(tree, wide, m.mesh.view(), rays, intersector);
+      for (const Intersector intersector : test::all_intersectors) {
+        test::expect_same_answers(tree, test::WideForm{wide.view()}, m.mesh.view(), rays,
+                                  intersector);
         if (testing::Test::HasFatalFailure()) return;
       }
     }
@@ -126,31 +91,20 @@ TEST(WideTree, NothingIsLeftOutThatRoundingHits) {
       far.origin -= 1000.0F * far.direction;
       rays.push_back(far);
     }
-    for (const Intersector intersector : all_intersectors) {
-      expect_same_answers(tree, wide, mesh.view(), rays, intersector);
+    for (const Intersector intersector : test::all_intersectors) {
+      test::expect_same_answers(tree, test::WideForm{wide.view()}, mesh.view(), rays, intersector);
       if (testing::Test::HasFatalFailure()) return;
     }
   }
 }
 
 TEST(WideTree, OfNothingMissesEverything) {
-  const Ray ray{{0, 0, -1}, 0, {0, 0, 1}};
   const scene::Mesh none;
   const Tree tree = build(none.view());
   const WideTree wide = cpu::widen({}, tree.view(), none.view());
   EXPECT_EQ(wide.bytes(), 0u);
-  for (const WideTree* empty : {&wide, static_cast<const WideTree*>(nullptr)}) {
-    const WideTreeView view = empty != nullptr ? empty->view() : WideTreeView{};
-    for (const Intersector intersector : all_intersectors) {
-      EXPECT_FALSE(cpu::closest_hit(view, ray, intersector));
-      EXPECT_FALSE(cpu::any_hit(view, ray, intersector));
-    }
-    std::vector<Hit> hits(1, Hit{1, 2, 3, 4});
-    std::vector<TraversalCost> costs(1, TraversalCost{5, 6});
-    cpu::closest_hit({}, view, std::span(&ray, 1), hits, costs);
-    EXPECT_TRUE(same_bits(hits[0], Hit{}));
-    EXPECT_EQ(costs[0].node_visits + costs[0].triangle_tests, 0u);
-  }
+  test::expect_misses(test::WideForm{wide.view()});
+  test::expect_misses(test::WideForm{});
 }
 
 // A leaf that nothing can divide is a row of blocks: alone, and below nodes.
@@ -160,8 +114,8 @@ TEST(WideTree, HugeLeaves) {
     const Tree tree = build(mesh.view(), options_for(References::once));
     const WideTree wide = cpu::widen({.threads = 2}, tree.view(), mesh.view());
     const std::vector<Ray> rays = scene::hard_rays(mesh, tree.view(), 12, 12);
-    for (const Intersector intersector : all_intersectors) {
-      expect_same_answers(tree, wide, mesh.view(), rays, intersector);
+    for (const Intersector intersector : test::all_intersectors) {
+      test::expect_same_answers(tree, test::WideForm{wide.view()}, mesh.view(), rays, intersector);
       if (testing::Test::HasFatalFailure()) return;
     }
   }
@@ -172,22 +126,8 @@ TEST(WideTree, ShorterSpansEndTheWork) {
   const Tree tree = build(mesh.view());
   const WideTree wide = cpu::widen({}, tree.view(), mesh.view());
   const std::vector<Ray> rays = scene::rays_at_features(mesh, 100, 74);
-  const std::vector<Hit> want = test::closest(tree.view(), mesh.view(), rays);
-  const Hit untouched{-1, -2, -3, 12345};
-  for (const std::size_t length : {0u, 1u, 37u, 100u}) {
-    std::vector<Hit> hits(100, untouched);
-    cpu::closest_hit({}, wide.view(), rays, std::span(hits).first(length));
-    std::vector<Hit> fewer(100, untouched);
-    std::vector<TraversalCost> costs(std::max<std::size_t>(length, 1));
-    cpu::closest_hit({}, wide.view(), rays, fewer, costs);
-    std::vector<std::uint8_t> occluded(100, 9);
-    cpu::any_hit({}, wide.view(), rays, std::span(occluded).first(length));
-    for (std::size_t i = 0; i < 100; ++i) {
-      EXPECT_TRUE(same_bits(hits[i], i < length ? want[i] : untouched));
-      EXPECT_TRUE(same_bits(fewer[i], i < costs.size() ? want[i] : untouched));
-      EXPECT_EQ(occluded[i], i < length ? (test::is_hit(want[i]) ? 1 : 0) : 9);
-    }
-  }
+  test::expect_shorter_spans_end_the_work(test::WideForm{wide.view()}, rays,
+                                          test::closest(tree.view(), mesh.view(), rays));
 }
 
 // ---- What it is made of -------------------------------------------------------------------------

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include <zkd/build.hpp>
+#include <zkd/cpu/plane_tree.hpp>
 #include <zkd/cpu/wide_tree.hpp>
 #include <zkd/query.hpp>
 
@@ -106,10 +107,11 @@ std::string describe(const std::string& mesh, std::uint64_t case_number,
 }
 
 // What answered the rays, in the order of the rows of a report.
-enum class Answerer : std::uint8_t { tree, wide_tree, cuda_tree };
-constexpr std::array answerers{Answerer::tree, Answerer::wide_tree, Answerer::cuda_tree};
+enum class Answerer : std::uint8_t { tree, wide_tree, plane_tree, cuda_tree };
+constexpr std::array answerers{Answerer::tree, Answerer::wide_tree, Answerer::plane_tree,
+                               Answerer::cuda_tree};
 constexpr const char* prefix(Answerer answerer) {
-  constexpr const char* prefixes[] = {"", "wide ", "cuda "};
+  constexpr const char* prefixes[] = {"", "wide ", "planes ", "cuda "};
   return prefixes[static_cast<std::size_t>(answerer)];
 }
 std::size_t row_of(Answerer answerer, std::size_t intersector) {
@@ -134,6 +136,8 @@ class Case {
         options_(options_of(number, random_)),
         tree_(zkd::build(executor_, triangles_, options_)),
         wide_(cpu::widen(executor_, tree_.view(), triangles_)),
+        planes_(options_.references == References::all ? cpu::strip_boxes(executor_, tree_)
+                                                       : cpu::PlaneTree()),
         rays_(test::RayMaker(named_.mesh, tree_.view(), random_.bits64()).all_kinds(rays)),
         by_loop_(rays),
         by_tree_(rays),
@@ -165,6 +169,12 @@ class Case {
     cpu::closest_hit(executor_, wide_.view(), rays, by_tree_, {}, intersector);
     cpu::any_hit(executor_, wide_.view(), rays, occluded_, {}, intersector);
     count(rays.size(), Answerer::wide_tree, which);
+    if (options_.references == References::all) {
+      const cpu::PlaneTreeView& planes = planes_.view();
+      cpu::closest_hit(executor_, planes, triangles_, rays, by_tree_, {}, intersector);
+      cpu::any_hit(executor_, planes, triangles_, rays, occluded_, {}, intersector);
+      count(rays.size(), Answerer::plane_tree, which);
+    }
     if (cuda_ && intersector != Intersector::exact && !tree.empty()) {
       // The loop is the host's: the device has to come to its bits.
       const auto contender =
@@ -209,6 +219,7 @@ class Case {
   cpu::Executor executor_{.threads = 1};
   Tree tree_;
   cpu::WideTree wide_;
+  cpu::PlaneTree planes_;  ///< of strict trees
   std::vector<Ray> rays_;
   std::vector<Hit> by_loop_;
   std::vector<Hit> by_tree_;

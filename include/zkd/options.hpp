@@ -134,7 +134,8 @@ struct BuildOptions {
 
   /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
   /// 1024, or 0: 4, with `all` 8. With `all` a leaf that lists more than four times as many is
-  /// split again, by what lies in its cell, into trunks of twice as many. Of 1, 2, 4 and 8, 4 was
+  /// split again, by what lies in its cell, into trunks of twice as many, unless the boxes of what
+  /// lies there are nearly the same. Of 1, 2, 4 and 8, 4 was
   /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; `all` was
   /// built 1.3 to 1.8 times as fast with 8 as with 4 in 0.5 to 0.6 of the memory, and traced as a
   /// wide tree within a tenth of the speed (Bunny, Sibenik, Conference), as a binary one at 0.8 to

@@ -177,11 +177,13 @@ struct SplitLeaves {
 };
 
 /// Stage 10 again, crowded leaves of `all`: those that list more than 4 * leaf_size triangles are
-/// split. What of them lies in the cell (`inside`, with `leaf_offsets` and `references` as
-/// list_references() made them) is coded by the centre of its box, with up to 32 bits on a lattice
-/// over these centres, and trunks of at most 2 * leaf_size such codes become the leaf's subtree, in
-/// every cell of which the triangles are listed that touch it. Other leaves stay as they are.
-/// `trunk_keys` are stage 7's. Call it with empty spans first: the sizes are in what it returns.
+/// split, unless the boxes of what lies in the cell are nearly the same: their areas add up to 7/8
+/// or more of that of the box about them, times their number. What of them lies in the cell
+/// (`inside`, with `leaf_offsets` and `references` as list_references() made them) is coded by the
+/// centre of its box, with up to 32 bits on a lattice over these centres, and trunks of at most 2 *
+/// leaf_size such codes become the leaf's subtree, in every cell of which the triangles are listed
+/// that touch it. Other leaves stay as they are. `trunk_keys` are stage 7's. Call it with empty
+/// spans first: the sizes are in what it returns.
 ///
 /// Throws Error too_many_references; and invalid_view where an index is out of range.
 /// O(references * depth).

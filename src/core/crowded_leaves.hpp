@@ -12,6 +12,7 @@
 #include <zkd/options.hpp>
 #include <zkd/tree.hpp>
 
+#include "core/area.hpp"
 #include "core/arena.hpp"
 #include "core/compress.hpp"
 #include "core/essential.hpp"
@@ -34,20 +35,54 @@ inline constexpr std::uint32_t reference_trunk_factor = 2;
 /// Leaves of a crowded leaf's reference that are remembered.
 inline constexpr std::uint32_t remembered_of_reference = 2;
 
-/// How many levels a leaf's subtree may have, so that no path becomes longer than max_depth.
+/// A crowded leaf stays whole where a random line through what it lists meets so many eighths of
+/// its triangles' boxes or more: they are nearly the same box, and each cell of a subtree would
+/// list nearly all of them. (From half on is too few: boxes of needles shrink as cells do, and
+/// leaves of 3,000 needles would have twice the tests.)
+inline constexpr std::uint64_t alike_eighths = 7;
+
+/// How many levels a leaf's subtree may have: no path becomes longer than max_depth, and a leaf
+/// that splitting would not thin gets none.
 struct LevelsLeft {
   const std::uint32_t* offsets;
   std::uint32_t crowded;
+  const std::uint32_t* numbers;
+  const Box* inside;
   const Parent* parents_of_leaves;
   const Parent* parents_of_nodes;
   std::uint8_t* levels;
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) const {
+    const std::uint32_t first = offsets[leaf];
+    const std::uint32_t end = offsets[leaf + 1];
     std::uint32_t depth = 0;
-    if (offsets[leaf + 1] - offsets[leaf] > crowded)
+    if (end - first > crowded) {
+      if (!splitting_thins(first, end)) {
+        levels[leaf] = 0;
+        return;
+      }
       for (Parent up = parents_of_leaves[leaf]; !up.is_none(); up = parents_of_nodes[up.node()])
         ++depth;
+    }
     levels[leaf] = static_cast<std::uint8_t>(smaller(fine_bits, max_depth - depth));
+  }
+
+ private:
+  /// A line that meets the box about all meets another in it with the odds of their areas. Summed
+  /// in whole parts of 2^-16, so that the order of the references does not matter.
+  [[nodiscard]] ZKD_HOST_DEVICE bool splitting_thins(std::uint32_t first, std::uint32_t end) const {
+    constexpr std::uint64_t unit = 65536;
+    Box all;
+    for (std::uint32_t i = first; i < end; ++i) include(all, inside[numbers[i]]);
+    const double area = half_area(all);
+    if (!(area > 0.0)) return false;
+    const double scale = static_cast<double>(unit) / area;
+    std::uint64_t met = 0;
+    for (std::uint32_t i = first; i < end; ++i) {
+      const double parts = half_area(inside[numbers[i]]) * scale;
+      met += parts > 0.0 ? static_cast<std::uint64_t>(parts) : 0;
+    }
+    return 8 * met < alike_eighths * unit * (end - first);
   }
 };
 
@@ -306,8 +341,9 @@ struct SplitCrowdedLeaves {
     const std::uint32_t crowded = crowded_factor * leaf_size;
     CrowdedLeavesWorkspace room{};
     backend.take(room, backend.size(references), backend.size(leaves));
-    backend.for_each(leaves, LevelsLeft{tree.offsets, crowded, tree.parents_of_leaves,
-                                        tree.parents_of_nodes, room.levels_left});
+    backend.for_each(
+        leaves, LevelsLeft{tree.offsets, crowded, tree.numbers, tree.inside, tree.parents_of_leaves,
+                           tree.parents_of_nodes, room.levels_left});
     SecondRound<std::uint32_t, Backend> round{tree.inside,
                                               tree.leaf_of,
                                               tree.numbers,

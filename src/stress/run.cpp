@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <zkd/build.hpp>
+#include <zkd/cpu/plane_tree.hpp>
 #include <zkd/cpu/wide_tree.hpp>
 #include <zkd/query.hpp>
 
@@ -165,15 +166,23 @@ void check_brute_force(const Case& which, const Tree& tree, std::span<const Ray>
   check_rounding_intersectors(which, tree, fewer, answers, executor, findings);
 }
 
-// The wide form of a tree has its answers.
-void check_wide(const TreeView& tree, const TriangleView& triangles, std::span<const Ray> rays,
-                std::span<const Hit> hits, const cpu::Executor& executor, Findings& findings) {
-  const cpu::WideTree wide = cpu::widen(executor, tree, triangles);
+// The other forms of a tree have its answers.
+void check_forms(const Tree& tree, const TriangleView& triangles, std::span<const Ray> rays,
+                 std::span<const Hit> hits, const cpu::Executor& executor, Findings& findings) {
   std::vector<Hit> others(rays.size());
-  cpu::closest_hit(executor, wide.view(), rays, others);
-  compare(others, hits, rays, "another answer through the wide tree", findings);
   std::vector<std::uint8_t> occluded(rays.size());
-  cpu::any_hit(executor, wide.view(), rays, occluded);
+  {
+    const cpu::WideTree wide = cpu::widen(executor, tree.view(), triangles);
+    cpu::closest_hit(executor, wide.view(), rays, others);
+    compare(others, hits, rays, "another answer through the wide tree", findings);
+    cpu::any_hit(executor, wide.view(), rays, occluded);
+    compare_any(occluded, hits, rays, findings);
+  }
+  if (tree.options().references != References::all) return;
+  const cpu::PlaneTree planes = cpu::strip_boxes(executor, tree);
+  cpu::closest_hit(executor, planes.view(), triangles, rays, others);
+  compare(others, hits, rays, "another answer through the planes alone", findings);
+  cpu::any_hit(executor, planes.view(), triangles, rays, occluded);
   compare_any(occluded, hits, rays, findings);
 }
 
@@ -330,7 +339,7 @@ void run_traced(const Case& which, const Setting& setting, Findings& findings) {
       compare(others, hits, rays, "another answer than through the first tree", findings);
     }
     compare_any(occluded, hits, rays, findings);
-    check_wide(tree, triangles, rays, hits, executor, findings);
+    check_forms(*trees[i], triangles, rays, hits, executor, findings);
   }
   findings.about(which.name);
   if (!rays.empty()) {
