@@ -4,10 +4,16 @@
 // alone, in nodes of eight bytes (Wald, Realtime Ray Tracing and Interactive Global Illumination,
 // 2004, section 7.2; Pharr, Jakob, Humphreys, Physically Based Rendering, 2016, section 4.4).
 //
-// It is the smallest form: for programs with more triangles than memory. It is only for strict
+// It is the smallest form, for programs with more triangles than memory. It is only for strict
 // trees (References::all, Builder::sah and wu2011): where a leaf lists what its cell holds, a ray
 // needs no box. `strip_boxes` makes it, and every answer through it has the bits of the query on
 // the tree itself (zkd/query.hpp, whose rules hold here word for word).
+//
+// Trees of Builder::sah with SahOptions{.test_cost = 1, .areas = SahAreas::cells, .empty_bonus =
+// 0.2} are made for it: on Sibenik one of 2.9 MB (9.1 with boxes) traced primary, diffuse and
+// shadow rays at 1.5, 1.1 and 1.8 times the speed of the tree itself, on Bunny at 1.6, 1.2 and 1.6
+// times. Other trees count on their tight boxes to cut off what is empty: through their planes
+// alone rays take 1.4 to 6 times as long.
 //
 // It does not need the tree any more, and keeps its references, but no copy of the triangles:
 // queries take them as those on a Tree do.
