@@ -3,6 +3,8 @@
 // What validation asks of each triangle, over its three axes at once.
 #pragma once
 
+#include <cstdint>
+
 #include <zkd/geometry.hpp>
 #include <zkd/traversal/arithmetic.hpp>
 #include <zkd/traversal/triangle.hpp>
@@ -61,7 +63,7 @@ class TriangleLanesOf {
     FloatLanes least;
     FloatLanes most;
     find_box(least, most);
-    for (int a = 0; a < 3; ++a) {
+    for (std::uint32_t a = 0; a < 3; ++a) {
       box.lo[a] = least[a] + 0.0F;
       box.hi[a] = most[a] + 0.0F;
     }
