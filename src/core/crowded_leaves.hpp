@@ -37,8 +37,8 @@ inline constexpr std::uint32_t remembered_of_reference = 2;
 
 /// A crowded leaf stays whole where a random line through what it lists meets so many eighths of
 /// its triangles' boxes or more: they are nearly the same box, and each cell of a subtree would
-/// list nearly all of them. (From half on is too few: boxes of needles shrink as cells do, and
-/// leaves of 3,000 needles would have twice the tests.)
+/// list nearly all of them. (Half is too few: boxes of needles shrink as cells do, and 3,000
+/// needles would be tested twice as often.)
 inline constexpr std::uint64_t alike_eighths = 7;
 
 /// How many levels a leaf's subtree may have: no path becomes longer than max_depth, and a leaf

@@ -98,6 +98,7 @@ class Stripping {
       throw Error(ErrorCode::too_many_references, leaves,
                   "the tree has " + std::to_string(leaves) + " leaves; a plane tree has at most " +
                       std::to_string(PlaneNode::most / 2 + 1));
+    if (tree_.reference_count() <= PlaneNode::most) return;
     for (std::uint32_t leaf = 0; leaf < leaves; ++leaf) {
       const std::uint32_t count = references_of(leaf);
       if (count > PlaneNode::most)
