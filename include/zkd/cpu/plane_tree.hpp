@@ -19,14 +19,13 @@
 // queries take them as those on a Tree do.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <memory_resource>
 #include <optional>
 #include <span>
 
 #include <zkd/config.hpp>
 #include <zkd/cpu/executor.hpp>
+#include <zkd/cpu/tree_form.hpp>
 #include <zkd/geometry.hpp>
 #include <zkd/query.hpp>
 #include <zkd/tree.hpp>
@@ -66,33 +65,9 @@ struct PlaneTreeView {
   }
 };
 
-/// Owns a plane tree: one block from the memory resource it was made with. Movable; one that was
-/// moved from is empty. Reading one from several threads is safe.
-class ZKD_API PlaneTree {
- public:
-  /// An empty tree: every ray misses.
-  PlaneTree() = default;
-  PlaneTree(PlaneTree&& other) noexcept;
-  PlaneTree& operator=(PlaneTree&& other) noexcept;
-  PlaneTree(const PlaneTree&) = delete;             // megabytes: make it again
-  PlaneTree& operator=(const PlaneTree&) = delete;  // likewise
-  ~PlaneTree();
-
-  /// What queries take. Valid until this is destroyed, assigned or moved from.
-  [[nodiscard]] const PlaneTreeView& view() const noexcept { return view_; }
-
-  /// Bytes that it holds: 16 for each leaf and 4 for each reference, where the tree has 68 and 4.
-  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
-
- private:
-  friend struct PlaneTreeAssembler;
-  void swap(PlaneTree& other) noexcept;
-
-  PlaneTreeView view_;
-  void* data_ = nullptr;
-  std::size_t bytes_ = 0;
-  std::pmr::memory_resource* memory_ = nullptr;
-};
+/// Owns a plane tree. Of bytes() there are 16 for each leaf and 4 for each reference, where the
+/// tree has 68 and 4.
+using PlaneTree = TreeForm<PlaneTreeView>;
 
 /// The planes of a strict tree, whoever built it, in host memory. Bytes are the same for any number
 /// of threads and instruction set.

@@ -13,14 +13,13 @@
 // triangles any more. What changes there later does not reach it.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <memory_resource>
 #include <optional>
 #include <span>
 
 #include <zkd/config.hpp>
 #include <zkd/cpu/executor.hpp>
+#include <zkd/cpu/tree_form.hpp>
 #include <zkd/geometry.hpp>
 #include <zkd/query.hpp>
 #include <zkd/tree.hpp>
@@ -67,35 +66,11 @@ struct WideTreeView {
   [[nodiscard]] Link root() const { return header != nullptr ? header->root : Link{}; }
 };
 
-/// Owns a wide tree: one block from the memory resource it was made with. Movable; one that was
-/// moved from is empty. Reading one from several threads is safe.
-class ZKD_API WideTree {
- public:
-  /// An empty tree: every ray misses.
-  WideTree() = default;
-  WideTree(WideTree&& other) noexcept;
-  WideTree& operator=(WideTree&& other) noexcept;
-  WideTree(const WideTree&) = delete;             // megabytes: make it again
-  WideTree& operator=(const WideTree&) = delete;  // likewise
-  ~WideTree();
-
-  /// What queries take. Valid until this is destroyed, assigned or moved from.
-  [[nodiscard]] const WideTreeView& view() const noexcept { return view_; }
-
-  /// Bytes that it holds: 320 for each block and 224 for each node, of which there is one for every
-  /// three to six blocks. On the scenes of the benchmark that is 60 to 75 bytes for each triangle
-  /// where it is referenced once, and 180 to 240 for trees of References::all and Builder::sah.
-  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
-
- private:
-  friend struct WideTreeAssembler;
-  void swap(WideTree& other) noexcept;
-
-  WideTreeView view_;
-  void* data_ = nullptr;
-  std::size_t bytes_ = 0;
-  std::pmr::memory_resource* memory_ = nullptr;
-};
+/// Owns a wide tree. Of bytes() there are 320 for each block and 224 for each node, of which there
+/// is one for every three to six blocks. On the scenes of the benchmark that is 60 to 75 bytes for
+/// each triangle where it is referenced once, and 180 to 240 for trees of References::all and
+/// Builder::sah.
+using WideTree = TreeForm<WideTreeView>;
 
 /// The wide form of `tree`, which was built from `triangles` (or a copy of its data at other
 /// addresses), by any builder. Bytes are the same for any number of threads and instruction set.

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <bit>
 #include <string>
-#include <utility>
 
 #include <zkd/error.hpp>
 
@@ -16,41 +15,9 @@
 #include "core/host_block.hpp"
 #include "core/rounding.hpp"
 #include "cpu/threads.hpp"
+#include "cpu/tree_form.hpp"
 
-namespace zkd {
-
-void cpu::PlaneTree::swap(PlaneTree& other) noexcept {
-  std::swap(view_, other.view_);
-  std::swap(data_, other.data_);
-  std::swap(bytes_, other.bytes_);
-  std::swap(memory_, other.memory_);
-}
-
-cpu::PlaneTree::PlaneTree(PlaneTree&& other) noexcept : PlaneTree() { swap(other); }
-
-cpu::PlaneTree& cpu::PlaneTree::operator=(PlaneTree&& other) noexcept {
-  PlaneTree(std::move(other)).swap(*this);
-  return *this;
-}
-
-cpu::PlaneTree::~PlaneTree() {
-  if (data_ != nullptr) memory_->deallocate(data_, bytes_, core::Arena::alignment);
-}
-
-namespace cpu {
-
-/// Makes the owner of what strip_boxes() wrote.
-struct PlaneTreeAssembler {
-  static PlaneTree assemble(const PlaneTreeView& view, core::HostBlock& block) {
-    PlaneTree tree;
-    tree.view_ = view;
-    tree.memory_ = block.memory();
-    tree.bytes_ = block.bytes();
-    tree.data_ = block.release();
-    return tree;
-  }
-};
-
+namespace zkd::cpu {
 namespace {
 
 // The node or leaf at `link`, over the leaves from `begin` to `end`, and its place.
@@ -88,7 +55,7 @@ class Stripping {
                 references + range.begin);
     });
     const Box bounds = core::in_tree_space(tree_.bounds(), static_cast<double>(tree_.scale()));
-    return PlaneTreeAssembler::assemble({header, nodes_, references, bounds}, block);
+    return TreeFormAssembler::assemble(PlaneTreeView{header, nodes_, references, bounds}, block);
   }
 
  private:
@@ -185,5 +152,4 @@ PlaneTree strip_boxes(const Executor& executor, const Tree& tree) {
   return Stripping(executor, tree.view()).run();
 }
 
-}  // namespace cpu
-}  // namespace zkd
+}  // namespace zkd::cpu

@@ -9,7 +9,6 @@
 #include <atomic>
 #include <limits>
 #include <string>
-#include <utility>
 
 #include <zkd/error.hpp>
 #include <zkd/traversal/triangle.hpp>
@@ -18,43 +17,11 @@
 #include "core/check_input.hpp"
 #include "core/host_block.hpp"
 #include "cpu/threads.hpp"
+#include "cpu/tree_form.hpp"
 #include "cpu/wide/block.hpp"
 #include "cpu/wide/collapse.hpp"
 
-namespace zkd {
-
-void cpu::WideTree::swap(WideTree& other) noexcept {
-  std::swap(view_, other.view_);
-  std::swap(data_, other.data_);
-  std::swap(bytes_, other.bytes_);
-  std::swap(memory_, other.memory_);
-}
-
-cpu::WideTree::WideTree(WideTree&& other) noexcept : WideTree() { swap(other); }
-
-cpu::WideTree& cpu::WideTree::operator=(WideTree&& other) noexcept {
-  WideTree(std::move(other)).swap(*this);
-  return *this;
-}
-
-cpu::WideTree::~WideTree() {
-  if (data_ != nullptr) memory_->deallocate(data_, bytes_, core::Arena::alignment);
-}
-
-namespace cpu {
-
-/// Makes the owner of what widen() wrote.
-struct WideTreeAssembler {
-  static WideTree assemble(const WideTreeView& view, core::HostBlock& block) {
-    WideTree tree;
-    tree.view_ = view;
-    tree.memory_ = block.memory();
-    tree.bytes_ = block.bytes();
-    tree.data_ = block.release();
-    return tree;
-  }
-};
-
+namespace zkd::cpu {
 namespace {
 
 // Nodes and blocks: how many, or the next ones to be written.
@@ -244,7 +211,8 @@ class Widening {
     tasks_.placed = true;
     lay_out_top();
     for_each_task([this](Task& task) { layout_.lay_out(task.subtree, task.place, nullptr); });
-    return WideTreeAssembler::assemble({header, nodes, blocks, end.node, end.block}, block);
+    return TreeFormAssembler::assemble(WideTreeView{header, nodes, blocks, end.node, end.block},
+                                       block);
   }
 
  private:
@@ -285,5 +253,4 @@ WideTree widen(const Executor& executor, const TreeView& tree, const TriangleVie
   return Widening(executor, tree, triangles).run();
 }
 
-}  // namespace cpu
-}  // namespace zkd
+}  // namespace zkd::cpu
