@@ -87,10 +87,10 @@ TEST_P(QueryBruteForce, EveryAnswerIsTheSame) {
       SCOPED_TRACE(m.name + ", seed " + std::to_string(seed) + ", " + to_string(references));
       const test::PlatformTree tree(m.mesh.view(), options_for(references, seed));
       test::RayMaker maker(m.mesh, tree.host().view(), seed);
-      std::vector<Ray> rays = maker.all_kinds(720);
+      std::vector<Ray> rays = maker.all_kinds(360);
       for (const std::vector<Ray>& more :
-           {scene::random_rays(tree.host().view().bounds(), 100, seed),
-            scene::rays_at_features(m.mesh, 100, seed), scene::axis_rays(m.mesh, 100, seed)}) {
+           {scene::random_rays(tree.host().view().bounds(), 60, seed),
+            scene::rays_at_features(m.mesh, 60, seed), scene::axis_rays(m.mesh, 60, seed)}) {
         rays.insert(rays.end(), more.begin(), more.end());
       }
       for (const Intersector intersector : test::intersectors()) {

@@ -90,7 +90,7 @@ TEST_P(QueryOracle, NothingOutsideTheBand) {
     const verify::Oracle oracle(m.mesh.view());
     for (const References references : {References::once, References::all}) {
       const test::PlatformTree tree(m.mesh.view(), options_for(references));
-      const std::vector<Ray> rays = rays_for(m, tree, 600, seed);
+      const std::vector<Ray> rays = rays_for(m, tree, 360, seed);
       for (const Intersector intersector : test::intersectors()) {
         SCOPED_TRACE("seed " + std::to_string(seed) + ", " + to_string(references) + ", " +
                      to_string(intersector));

@@ -53,7 +53,7 @@ void expect_same_answers(const Tree& tree, const scene::Mesh& mesh, const std::v
 class SahQuery : public testing::TestWithParam<test::MeshKind> {};
 
 TEST_P(SahQuery, EveryAnswerIsThatOfBruteForce) {
-  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
     const test::NamedMesh m = test::small_mesh(GetParam().number, seed);
     SCOPED_TRACE(m.name + ", seed " + std::to_string(seed));
     const Tree tree = build(cpu::Executor{}, m.mesh.view(), options_for(seed));

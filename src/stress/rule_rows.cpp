@@ -380,7 +380,7 @@ void any_hits(const Setting& setting, const Yield& yield) {
     for (std::uint64_t i = 0; i < setting.pick(1u, 10u); ++i) {
       scene::NamedMesh mesh = scene::small_mesh(kind, 100 * setting.seed + i);
       Case made =
-          hard_case(mesh.name, std::move(mesh.mesh), many_options(), setting.pick(1200u, 12000u));
+          hard_case(mesh.name, std::move(mesh.mesh), many_options(), setting.pick(480u, 12000u));
       made.also = [](const Traced& traced, Findings& findings) {
         for (std::size_t k = 0; k < traced.rays.size(); ++k) {
           const bool any = any_hit(traced.trees[0]->view(), traced.of.mesh.view(), traced.rays[k]);

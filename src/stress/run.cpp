@@ -34,8 +34,10 @@ using verify::same_bits;
 
 // Work that grows with triangles times rays, and what is done once a triangle many times over, is
 // bounded by these.
-constexpr std::uint64_t most_brute_force_tests = 50'000'000;
 constexpr std::uint64_t most_oracle_tests = 40'000'000;
+constexpr std::uint64_t most_brute_force_tests(Size size) {
+  return size == Size::small ? 5'000'000 : 50'000'000;
+}
 constexpr std::size_t many_triangles = 100'000;
 
 double ms_of(const std::function<void()>& work) {
@@ -152,10 +154,10 @@ void compare_any(std::span<const std::uint8_t> occluded, std::span<const Hit> hi
 }
 
 void check_brute_force(const Case& which, const Tree& tree, std::span<const Ray> rays,
-                       std::span<const Hit> hits, const cpu::Executor& executor,
+                       std::span<const Hit> hits, const cpu::Executor& executor, Size size,
                        Findings& findings) {
   const std::uint64_t most =
-      most_brute_force_tests / std::max<std::uint64_t>(which.mesh.faces.size(), 1);
+      most_brute_force_tests(size) / std::max<std::uint64_t>(which.mesh.faces.size(), 1);
   const std::vector<std::size_t> places = sample(rays.size(), most);
   const std::vector<Ray> some = at(rays, places);
   std::vector<Hit> want(some.size());
@@ -343,7 +345,7 @@ void run_traced(const Case& which, const Setting& setting, Findings& findings) {
   }
   findings.about(which.name);
   if (!rays.empty()) {
-    check_brute_force(which, *trees[0], rays, hits, executor, findings);
+    check_brute_force(which, *trees[0], rays, hits, executor, setting.size, findings);
     check_hits_in_order(which, trees, rays, hits, executor, findings);
     check_oracle(which, *trees[0], rays, hits, executor, findings);
     check_hits(which, rays, hits, findings);
