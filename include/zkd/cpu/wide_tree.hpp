@@ -29,7 +29,7 @@ namespace zkd::cpu {
 /// Children of a node, and triangles of a block: floats in a register of AVX2.
 inline constexpr int wide = 8;
 
-/// A node: several levels of nodes of the tree in one, by surface area. Boxes are in tree space
+/// A node: several levels of nodes of the tree in one. Boxes are in tree space
 /// (TreeView::scale); those that are unused are empty (+inf, -inf) and stand at the end.
 ///
 ///     byte   0  bounds[0]  x: eight lows, eight highs
@@ -75,10 +75,13 @@ using WideTree = TreeForm<WideTreeView>;
 /// The wide form of `tree`, which was built from `triangles` (or a copy of its data at other
 /// addresses), by any builder. Bytes are the same for any number of threads and instruction set.
 ///
-/// Takes from `executor.memory` what the result holds and, while it works, at most 256 KB besides.
-/// Nodes are collapsed by surface area: the child with the largest box is replaced by its two
-/// children until there are eight (Wald, Benthin, Boulos: Getting Rid of Packets, RT 2008). Parts
-/// of the tree that list eight different triangles or fewer become one leaf. O(references) work.
+/// Parts of the tree that list eight different triangles or fewer become one leaf. Of the nodes
+/// above them those become wide ones whose surfaces add up to the least, so that a ray meets as few
+/// as can be (Ylitie, Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed
+/// Wide BVHs, HPG 2017, section 3.1, with the leaves given). O(references) work.
+///
+/// Takes from `executor.memory` what the result holds and, while it works, 4 bytes for each node of
+/// the tree and at most 512 KB besides.
 ///
 /// Throws Error: invalid_view, invalid_option as build(); index_out_of_range naming a reference
 /// to a triangle that `triangles` does not have; out_of_memory. Then nothing is held.

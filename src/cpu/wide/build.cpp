@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// widen(): nodes and blocks are laid out depth first, each subtree by one thread. The top of the
-// tree is cut into subtrees by the number of leaves alone, each is counted, places come from a sum
-// over the counts, and then each is written: the same bytes for any number of threads.
+// widen(): which nodes of the tree become wide ones is found from the leaves up (collapse.hpp), in
+// subtrees that one thread each solves and then in the top of the tree. Nodes and blocks are laid
+// out depth first, each subtree by one thread. The top of the tree is cut into subtrees by the
+// number of leaves alone, each is counted, places come from a sum over the counts, and then each is
+// written. All of it has the same bytes for any number of threads.
 #include <zkd/cpu/wide_tree.hpp>
 
 #include <algorithm>
@@ -61,12 +63,22 @@ struct Tasks {
   }
 };
 
+// A part of the tree that one thread collapses.
+struct Branch {
+  Part part;
+  double area;
+  Surfaces surfaces;
+};
+constexpr std::uint32_t most_branches = 4096;
+
 std::uint32_t blocks_for(std::uint32_t references) { return (references + wide - 1) / wide; }
 
 class Layout {
  public:
   Layout(const TreeView& tree, const TriangleView& triangles)
       : tree_(tree), triangles_(triangles) {}
+
+  void collapse_by(const Shares& shares) { shares_ = shares; }
 
   void write_to(WideNode* nodes, TriangleBlock* blocks) {
     nodes_ = nodes;
@@ -82,7 +94,7 @@ class Layout {
     while (count > 0) {
       const Subtree subtree = waiting[--count];
       const std::uint32_t index = next.node++;
-      const Children children(tree_, subtree.part);
+      const Children children(tree_, shares_, subtree.part);
       if (nodes_ != nullptr) start(subtree, index, children);
       for (int i = 0; i < children.count(); ++i)
         if (children.is_leaf(i)) {
@@ -110,7 +122,7 @@ class Layout {
       return count;
     }
     if (merged) {
-      const Children::Triangles triangles(tree_, part);
+      const PartTriangles triangles(tree_, part);
       write(blocks_[first], triangles.ids(), triangles.count());
     }
     for (std::uint32_t i = 0; i < n && !merged; i += wide)
@@ -162,12 +174,13 @@ class Layout {
 
   const TreeView& tree_;
   const TriangleView& triangles_;
+  Shares shares_;
   WideNode* nodes_ = nullptr;
   TriangleBlock* blocks_ = nullptr;
   mutable std::atomic<std::uint32_t> offender_{no_triangle};  // the lowest
 };
 
-// Lays out the whole tree in two passes.
+// Collapses the whole tree, and lays it out in two passes.
 class Widening {
  public:
   Widening(const Executor& executor, const TreeView& tree, const TriangleView& triangles)
@@ -180,10 +193,19 @@ class Widening {
   WideTree run() {
     // 256 shares of equal size, or fewer that are worth a thread's while.
     tasks_.largest = std::max<std::uint32_t>(1024, tree_.leaf_count() / 256);
-    if (tree_.leaf_count() > tasks_.largest) tasks_.capacity = Tasks::most;
-    const core::HostBlock workspace(memory_, tasks_.capacity * sizeof(Task));
-    tasks_.data = static_cast<Task*>(workspace.data());
+    const bool divided = tree_.leaf_count() > tasks_.largest;
+    tasks_.capacity = divided ? Tasks::most : 0;
+    std::uint32_t* shares = nullptr;
+    const auto take_workspace = [&](core::Arena arena) {
+      shares = arena.take<std::uint32_t>(tree_.node_count());
+      tasks_.data = arena.take<Task>(tasks_.capacity);
+      branches_ = arena.take<Branch>(divided ? most_branches : 0);
+      return arena.used();
+    };
+    const core::HostBlock workspace(memory_, take_workspace(core::Arena()));
+    take_workspace(core::Arena(workspace.data()));
 
+    collapse(Shares(shares), divided ? most_branches : 0);
     Place end = lay_out_top();
     for_each_task([this](Task& task) { layout_.lay_out(task.subtree, task.place, nullptr); });
     layout_.check_references();
@@ -216,7 +238,38 @@ class Widening {
   }
 
  private:
-  [[nodiscard]] bool is_one_leaf() const { return Children::is_leaf(tree_, root_.part); }
+  [[nodiscard]] bool is_one_leaf() const { return is_leaf(tree_, root_.part); }
+
+  // Branches first, each by one thread, then what is above them.
+  void collapse(const Shares& shares, std::uint32_t most) {
+    layout_.collapse_by(shares);
+    if (is_one_leaf()) return;
+    const Collapse collapse(tree_, shares);
+    const auto none = [](const Part&, double, Surfaces&) { return false; };
+    std::uint32_t count = 0;
+    const auto is_branch = [&](const Part& part) {
+      return count < most && part.end - part.begin <= tasks_.largest;
+    };
+    const auto name = [&](const Part& part, double area, Surfaces&) {
+      if (!is_branch(part)) return false;
+      branches_[count++] = {part, area, {}};
+      return true;
+    };
+    const auto solved = [&](const Part& part, double, Surfaces& surfaces) {
+      if (!is_branch(part)) return false;
+      surfaces = branches_[count++].surfaces;
+      return true;
+    };
+    if (most > 0) collapse.solve(root_.part, 0.0, name);
+    threads_.share(count, 1, [this, &collapse, none](Range range) {
+      for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        Branch& branch = branches_[i];
+        branch.surfaces = collapse.solve(branch.part, branch.area, none);
+      }
+    });
+    count = 0;
+    collapse.solve(root_.part, 0.0, solved);
+  }
 
   // Names the tasks on the way.
   Place lay_out_top() {
@@ -242,6 +295,7 @@ class Widening {
   Layout layout_;
   Subtree root_;
   Tasks tasks_;
+  Branch* branches_ = nullptr;
 };
 
 }  // namespace

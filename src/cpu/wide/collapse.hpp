@@ -2,6 +2,13 @@
 //
 // What becomes of the binary tree: which of its nodes are the children of one wide node, and which
 // parts of it are leaves.
+//
+// Parts that one block holds are leaves, wherever they lie. Of what is above them, those nodes
+// become wide ones whose surfaces add up to the least: as many wide nodes as a random ray meets
+// (Ylitie, Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs,
+// HPG 2017, section 3.1, with the leaves given). What is below a node of the tree may take one to
+// eight places in a wide node above it; for each number of them the least is found from those of
+// its two children, from the leaves up.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +18,8 @@
 #include <zkd/geometry.hpp>
 #include <zkd/tree.hpp>
 
+#include "core/area.hpp"
+
 namespace zkd::cpu {
 
 /// A subtree: leaves [begin, end) of the tree, of which node j separates j and j + 1.
@@ -18,20 +27,141 @@ struct Part {
   Link link;
   std::uint32_t begin;
   std::uint32_t end;
+
+  [[nodiscard]] std::uint32_t references(const TreeView& tree) const {
+    return tree.leaf_offsets[end] - tree.leaf_offsets[begin];
+  }
+};
+
+/// The triangles of a part, each once, as long as they fit into a block.
+class PartTriangles {
+ public:
+  PartTriangles(const TreeView& tree, const Part& part) {
+    const std::uint32_t n = part.references(tree);
+    const std::uint32_t* const first = tree.references + tree.leaf_offsets[part.begin];
+    // Not more than a few times as many are looked at.
+    fit_ = n <= 4 * static_cast<std::uint32_t>(wide);
+    for (std::uint32_t i = 0; i < n && fit_; ++i) {
+      if (std::find(ids_, ids_ + count_, first[i]) != ids_ + count_) continue;
+      fit_ = count_ < static_cast<std::uint32_t>(wide);
+      if (fit_) ids_[count_++] = first[i];
+    }
+  }
+  [[nodiscard]] bool fit() const { return fit_; }
+  [[nodiscard]] const std::uint32_t* ids() const { return ids_; }
+  [[nodiscard]] std::uint32_t count() const { return count_; }
+
+ private:
+  bool fit_;
+  std::uint32_t count_ = 0;
+  std::uint32_t ids_[wide];
+};
+
+/// Whether the part is one leaf of the wide tree: one of the tree's, or so few triangles, however
+/// often they are referenced, that they are one block.
+inline bool is_leaf(const TreeView& tree, const Part& part) {
+  return part.end - part.begin == 1 || PartTriangles(tree, part).fit();
+}
+
+/// What a node divides its part into: two parts, or one where the other lists nothing.
+struct Halves {
+  Part part[2] = {};
+  Box box[2];
+  int count = 0;
+
+  Halves(const TreeView& tree, const Part& of) {
+    const std::uint32_t index = of.link.index();
+    const Node& node = tree.nodes[index];
+    const Part both[2] = {{node.child[0], of.begin, index + 1}, {node.child[1], index + 1, of.end}};
+    for (int which = 0; which < 2; ++which) {
+      if (both[which].references(tree) == 0) continue;
+      part[count] = both[which];
+      for (int a = 0; a < 3; ++a) {
+        box[count].lo[a] = node.lo(which, a);
+        box[count].hi[a] = node.hi(which, a);
+      }
+      ++count;
+    }
+  }
+};
+
+/// For each node of the tree and each number of places for what is below it: how many of them go to
+/// its first half.
+class Shares {
+ public:
+  Shares() = default;
+  explicit Shares(std::uint32_t* of_nodes) : of_nodes_(of_nodes) {}
+
+  /// 0: the node takes one place, as a wide node of its own.
+  [[nodiscard]] int first_half(std::uint32_t node, int places) const {
+    return static_cast<int>(of_nodes_[node] >> shift(places) & 7u);
+  }
+  /// shares[k]: of k places, from 2 to 8 of them. (There is nothing to share of one.)
+  void set(std::uint32_t node, const int (&shares)[wide + 1]) const {
+    std::uint32_t bits = 0;
+    for (int places = 2; places <= wide; ++places)
+      bits |= static_cast<std::uint32_t>(shares[places]) << shift(places);
+    of_nodes_[node] = bits;
+  }
+
+ private:
+  static int shift(int places) { return 3 * (places - 1); }
+
+  std::uint32_t* of_nodes_ = nullptr;
+};
+
+/// The least surface of all wide nodes below a part, by the places that it may take.
+struct Surfaces {
+  double with[wide + 1] = {};
+};
+
+/// Finds out how places are shared.
+class Collapse {
+ public:
+  Collapse(const TreeView& tree, const Shares& shares) : tree_(tree), shares_(shares) {}
+
+  /// Of a part and all below it. `known(part, area, surfaces)` says whether a part's surfaces are
+  /// known already, and what they are. (A call of itself for each level of the tree.)
+  template <class Known>
+  Surfaces solve(const Part& part, double area, const Known& known) const {
+    Surfaces surfaces;
+    if (is_leaf(tree_, part) || known(part, area, surfaces)) return surfaces;
+    const Halves halves(tree_, part);
+    const Surfaces first = solve(halves.part[0], core::half_area(halves.box[0]), known);
+    if (halves.count == 1) return first;
+    const Surfaces second = solve(halves.part[1], core::half_area(halves.box[1]), known);
+
+    int shares[wide + 1] = {};
+    double shared[wide + 1] = {};
+    for (int places = 2; places <= wide; ++places) {
+      for (int share = 1; share < places; ++share) {
+        const double sum = first.with[share] + second.with[places - share];
+        if (share > 1 && sum >= shared[places]) continue;
+        shares[places] = share;
+        shared[places] = sum;
+      }
+    }
+    surfaces.with[1] = area + shared[wide];
+    for (int places = 2; places <= wide; ++places) {
+      const bool alone = surfaces.with[1] < shared[places];
+      if (alone) shares[places] = 0;
+      surfaces.with[places] = alone ? surfaces.with[1] : shared[places];
+    }
+    shares_.set(part.link.index(), shares);
+    return surfaces;
+  }
+
+ private:
+  const TreeView& tree_;
+  Shares shares_;
 };
 
 /// The children of one wide node, from left to right.
 class Children {
  public:
-  Children(const TreeView& tree, const Part& parent) : tree_(tree) {
-    open(parent, 0);
-    while (count_ < wide) {
-      const int largest = largest_to_open();
-      if (largest < 0) break;
-      const Part part = parts_[largest];
-      remove(largest);
-      open(part, largest);
-    }
+  Children(const TreeView& tree, const Shares& shares, const Part& parent)
+      : tree_(tree), shares_(shares) {
+    share(parent, wide);
   }
 
   [[nodiscard]] int count() const { return count_; }
@@ -39,98 +169,37 @@ class Children {
   [[nodiscard]] const Box& box(int i) const { return boxes_[i]; }
   [[nodiscard]] bool is_leaf(int i) const { return leaves_[i]; }
 
-  /// Whether the part is one leaf of the wide tree: one of the tree's, or so few triangles, however
-  /// often they are referenced, that they are one block.
-  static bool is_leaf(const TreeView& tree, const Part& part) {
-    return part.end - part.begin == 1 || Triangles(tree, part).fit();
-  }
-
-  /// The triangles of a part, each once, as long as they fit into a block.
-  class Triangles {
-   public:
-    Triangles(const TreeView& tree, const Part& part) {
-      const std::uint32_t n = references(tree, part);
-      const std::uint32_t* const first = tree.references + tree.leaf_offsets[part.begin];
-      // Not more than a few times as many are looked at.
-      fit_ = n <= 4 * static_cast<std::uint32_t>(wide);
-      for (std::uint32_t i = 0; i < n && fit_; ++i) {
-        if (std::find(ids_, ids_ + count_, first[i]) != ids_ + count_) continue;
-        fit_ = count_ < static_cast<std::uint32_t>(wide);
-        if (fit_) ids_[count_++] = first[i];
-      }
-    }
-    [[nodiscard]] bool fit() const { return fit_; }
-    [[nodiscard]] const std::uint32_t* ids() const { return ids_; }
-    [[nodiscard]] std::uint32_t count() const { return count_; }
-
-   private:
-    bool fit_;
-    std::uint32_t count_ = 0;
-    std::uint32_t ids_[wide];
-  };
-
-  static std::uint32_t references(const TreeView& tree, const Part& part) {
-    return tree.leaf_offsets[part.end] - tree.leaf_offsets[part.begin];
-  }
-
  private:
-  // Puts the two children of a part at place `at`; those that list nothing are left out.
-  void open(const Part& part, int at) {
-    const std::uint32_t index = part.link.index();
-    const Node& node = tree_.nodes[index];
-    const Part halves[2] = {{node.child[0], part.begin, index + 1},
-                            {node.child[1], index + 1, part.end}};
-    for (int which = 0; which < 2; ++which) {
-      if (references(tree_, halves[which]) == 0) continue;
-      for (int i = count_; i > at; --i) {
-        parts_[i] = parts_[i - 1];
-        boxes_[i] = boxes_[i - 1];
-        leaves_[i] = leaves_[i - 1];
-      }
-      parts_[at] = halves[which];
-      leaves_[at] = is_leaf(tree_, halves[which]);
-      for (int a = 0; a < 3; ++a) {
-        boxes_[at].lo[a] = node.lo(which, a);
-        boxes_[at].hi[a] = node.hi(which, a);
-      }
-      ++count_;
-      ++at;
+  void share(const Part& part, int places) {
+    const Halves halves(tree_, part);
+    if (halves.count == 1) {
+      add(halves.part[0], halves.box[0], places);
+      return;
     }
+    const int first = shares_.first_half(part.link.index(), places);
+    add(halves.part[0], halves.box[0], first);
+    add(halves.part[1], halves.box[1], places - first);
   }
 
-  void remove(int at) {
-    --count_;
-    for (int i = at; i < count_; ++i) {
-      parts_[i] = parts_[i + 1];
-      boxes_[i] = boxes_[i + 1];
-      leaves_[i] = leaves_[i + 1];
+  void add(const Part& part, const Box& box, int places) {
+    const bool leaf = cpu::is_leaf(tree_, part);
+    if (!leaf && (Halves(tree_, part).count == 1 ||
+                  (places > 1 && shares_.first_half(part.link.index(), places) > 0))) {
+      share(part, places);
+      return;
     }
-  }
-
-  // The first of the largest that is no leaf; -1: all are.
-  [[nodiscard]] int largest_to_open() const {
-    int largest = -1;
-    float most = -1.0F;
-    for (int i = 0; i < count_; ++i) {
-      if (is_leaf(i)) continue;
-      const float* lo = boxes_[i].lo;
-      const float* hi = boxes_[i].hi;
-      const float x = hi[0] - lo[0];
-      const float y = hi[1] - lo[1];
-      const float z = hi[2] - lo[2];
-      const float area = x * y + y * z + z * x;
-      if (area <= most) continue;
-      most = area;
-      largest = i;
-    }
-    return largest;
+    parts_[count_] = part;
+    boxes_[count_] = box;
+    leaves_[count_] = leaf;
+    ++count_;
   }
 
   const TreeView& tree_;
+  Shares shares_;
   int count_ = 0;
-  Part parts_[wide + 1];
-  Box boxes_[wide + 1];
-  bool leaves_[wide + 1];
+  Part parts_[wide];
+  Box boxes_[wide];
+  bool leaves_[wide];
 };
 
 }  // namespace zkd::cpu
