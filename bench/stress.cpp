@@ -135,8 +135,10 @@ int run(const Options& options) {
   for (const Row* row : options.rows) {
     Report report;
     {
-      const scene::Progress progress("row " + std::to_string(row->number) + ": " + row->name, 0);
-      report = run_row(*row, options.setting);
+      const std::string label = "row " + std::to_string(row->number) + ", " + row->name + ": ";
+      std::optional<scene::Progress> progress;
+      report = run_row(*row, options.setting,
+                       [&](const std::string& name) { progress.emplace(label + name, 0); });
     }
     print(report);
     totals.add(report);

@@ -44,9 +44,18 @@ BuildOptions options_for(References references, std::uint32_t leaf_size = 4) {
 }
 
 std::vector<BuildOptions> many_options() {
-  return {options_for(References::once), options_for(References::all),
-          options_for(References::once, 1), options_for(References::all, 1),
-          options_for(References::all, 64)};
+  std::vector<BuildOptions> all = {options_for(References::once), options_for(References::all),
+                                   options_for(References::once, 1),
+                                   options_for(References::all, 1),
+                                   options_for(References::all, 64)};
+  // Only these trees have leaves that list nothing.
+  BuildOptions sah = options_for(References::all);
+  sah.builder = Builder::sah;
+  all.push_back(sah);
+  sah.sah.areas = SahAreas::cells;
+  sah.sah.empty_bonus = 0.2F;
+  all.push_back(sah);
+  return all;
 }
 
 // ---- Answers ------------------------------------------------------------------------------------
@@ -307,8 +316,12 @@ TEST(WideTree, BranchesAddUpToTheWhole) {
         cpu::Collapse(tree.view(), cpu::Shares(shares.data()))
             .solve(whole, 0.0, [](const cpu::Part&, double, cpu::Surfaces&) { return false; })
             .with[cpu::wide];
+    ASSERT_GT(tree.view().leaf_count(), 1024u) << "one branch is enough";
     const WideTree wide = cpu::widen({.threads = 2}, tree.view(), mesh.view());
     EXPECT_NEAR(surface_of(wide.view()) / least, 1.0, 1e-9);
+    test::expect_same_answers(tree, test::WideForm{wide.view()}, mesh.view(),
+                              scene::hard_rays(mesh, tree.view(), 60, 3), Intersector::watertight);
+    if (testing::Test::HasFatalFailure()) return;
   }
 }
 

@@ -27,7 +27,9 @@ Progress::Progress(std::string label, std::uint64_t total)
     : label_(std::move(label)),
       total_(total),
       shown_(isatty(STDERR_FILENO) == 1),
-      next_draw_ns_(shown_ ? now_ns() + redraw_ns : 0) {}
+      next_draw_ns_(shown_ ? now_ns() + redraw_ns : 0) {
+  if (shown_ && total_ == 0) draw(0);
+}
 
 Progress::~Progress() { finish(); }
 
@@ -38,6 +40,10 @@ void Progress::advance(std::uint64_t amount) noexcept {
   std::int64_t due = next_draw_ns_.load(std::memory_order_relaxed);
   // Of the threads that find the line due, one draws.
   if (now < due || !next_draw_ns_.compare_exchange_strong(due, now + redraw_ns)) return;
+  draw(done);
+}
+
+void Progress::draw(std::uint64_t done) noexcept {
   drawn_.store(true, std::memory_order_relaxed);
   if (total_ == 0) {
     std::fprintf(stderr, "\r%s ...\033[K", label_.c_str());

@@ -12,10 +12,11 @@ namespace zkd::scene {
 /// Draws `label  42 %` on stderr while work goes on and takes it away when it is done.
 ///
 /// Nothing is ever written unless stderr is a terminal, so logs and pipes stay clean. Redrawn at
-/// most ten times a second, first after a tenth of a second: short work shows nothing.
+/// most ten times a second, first after a tenth of a second: short work shows nothing. Work whose
+/// length is not known shows `label ...` at once.
 class Progress {
  public:
-  /// `total` counts whatever advance() counts (bytes, rays, ...); 0 shows the label alone.
+  /// `total` counts whatever advance() counts (bytes, rays, ...); 0: it is not known.
   Progress(std::string label, std::uint64_t total);
 
   /// finish().
@@ -32,6 +33,8 @@ class Progress {
   void finish() noexcept;
 
  private:
+  void draw(std::uint64_t done) noexcept;
+
   std::string label_;
   std::uint64_t total_;
   bool shown_;

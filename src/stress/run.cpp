@@ -367,10 +367,12 @@ void run_case(const Case& which, const Setting& setting, Findings& findings) {
   findings.about("");
 }
 
-Report run_row(const Row& row, const Setting& setting) {
+Report run_row(const Row& row, const Setting& setting,
+               const std::function<void(const std::string&)>& begins) {
   Report report{row.number, row.name, {}, 0.0};
   report.ms = ms_of([&] {
     row.cases(setting, [&](const Case& which) {
+      begins(which.name);
       try {
         run_case(which, setting, report.findings);
       } catch (const std::exception& error) {

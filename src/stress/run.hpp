@@ -3,6 +3,7 @@
 // Runs rows of the stress matrix and says what came of it.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "stress/case.hpp"
@@ -28,8 +29,11 @@ struct Report {
   double ms = 0.0;
 };
 
-/// All cases of a row. An exception is a failure of the row.
-[[nodiscard]] Report run_row(const Row& row, const Setting& setting);
+/// All cases of a row; `begins` is told the name of each before it is run. An exception is a failure
+/// of the row.
+[[nodiscard]] Report run_row(
+    const Row& row, const Setting& setting,
+    const std::function<void(const std::string&)>& begins = [](const std::string&) {});
 
 /// One line: number, name, "ok", "FAILED" or "skipped (why)", counts, and times of an even scene.
 [[nodiscard]] std::string to_line(const Report& report);

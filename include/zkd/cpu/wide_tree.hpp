@@ -58,7 +58,7 @@ static_assert(sizeof(TriangleBlock) == 320);
 /// A non-owning view of a wide tree: plain, valid as long as its owner.
 struct WideTreeView {
   const TreeHeader* header = nullptr;     ///< that of the tree, but for `root`; null: empty
-  const WideNode* nodes = nullptr;        ///< depth first, from the root
+  const WideNode* nodes = nullptr;        ///< the root first, a subtree depth first
   const TriangleBlock* blocks = nullptr;  ///< near the node that they hang on
   std::uint32_t node_count = 0;
   std::uint32_t block_count = 0;
@@ -66,8 +66,8 @@ struct WideTreeView {
   [[nodiscard]] Link root() const { return header != nullptr ? header->root : Link{}; }
 };
 
-/// Owns a wide tree. Of bytes() there are 320 for each block and 224 for each node, of which there
-/// is one for every three to six blocks. On the scenes of the benchmark that is 60 to 75 bytes for
+/// Owns a wide tree. Of bytes() there are 320 for each block and 224 for each node. On the scenes of
+/// the benchmark there is a node for every three to six blocks, and that is 60 to 75 bytes for
 /// each triangle where it is referenced once, and 180 to 240 for trees of References::all and
 /// Builder::sah.
 using WideTree = TreeForm<WideTreeView>;
@@ -75,9 +75,9 @@ using WideTree = TreeForm<WideTreeView>;
 /// The wide form of `tree`, which was built from `triangles` (or a copy of its data at other
 /// addresses), by any builder. Bytes are the same for any number of threads and instruction set.
 ///
-/// Parts of the tree that list eight different triangles or fewer become one leaf. Of the nodes
-/// above them those become wide ones whose surfaces add up to the least, so that a ray meets as few
-/// as can be (Ylitie, Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed
+/// Parts of the tree that list eight different triangles or fewer (in at most 32 references) become
+/// one leaf. Of the nodes above them those become wide ones whose surfaces add up to the least, which
+/// random lines would meet the fewest of (Ylitie, Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed
 /// Wide BVHs, HPG 2017, section 3.1, with the leaves given). O(references) work.
 ///
 /// Takes from `executor.memory` what the result holds and, while it works, 4 bytes for each node of

@@ -18,6 +18,7 @@
 #include "core/arena.hpp"
 #include "core/check_input.hpp"
 #include "core/host_block.hpp"
+#include "cpu/float_environment.hpp"
 #include "cpu/threads.hpp"
 #include "cpu/tree_form.hpp"
 #include "cpu/wide/block.hpp"
@@ -191,7 +192,7 @@ class Widening {
         root_{{tree.root(), 0, tree.leaf_count()}, no_parent, 0} {}
 
   WideTree run() {
-    // 256 shares of equal size, or fewer that are worth a thread's while.
+    // 256 subtrees of equal size, or fewer that are worth a thread's while.
     tasks_.largest = std::max<std::uint32_t>(1024, tree_.leaf_count() / 256);
     const bool divided = tree_.leaf_count() > tasks_.largest;
     tasks_.capacity = divided ? Tasks::most : 0;
@@ -240,7 +241,9 @@ class Widening {
  private:
   [[nodiscard]] bool is_one_leaf() const { return is_leaf(tree_, root_.part); }
 
-  // Branches first, each by one thread, then what is above them.
+  // Branches first, each by one thread, then what is above them. The top is gone through twice, in
+  // the same order: to name the branches (what is written of it then means nothing), and with what
+  // they have come to. Branches beyond the most there is room for are left to the top.
   void collapse(const Shares& shares, std::uint32_t most) {
     layout_.collapse_by(shares);
     if (is_one_leaf()) return;
@@ -304,6 +307,7 @@ WideTree widen(const Executor& executor, const TreeView& tree, const TriangleVie
   core::check_view(triangles);
   check_executor(executor);
   if (tree.reference_count() == 0) return {};
+  const FloatEnvironment environment;  // for what is done by this thread alone
   return Widening(executor, tree, triangles).run();
 }
 

@@ -3,12 +3,12 @@
 // What becomes of the binary tree: which of its nodes are the children of one wide node, and which
 // parts of it are leaves.
 //
-// Parts that one block holds are leaves, wherever they lie. Of what is above them, those nodes
-// become wide ones whose surfaces add up to the least: as many wide nodes as a random ray meets
-// (Ylitie, Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs,
-// HPG 2017, section 3.1, with the leaves given). What is below a node of the tree may take one to
-// eight places in a wide node above it; for each number of them the least is found from those of
-// its two children, from the leaves up.
+// Parts that one block holds are leaves. Of the nodes above them, some become wide ones: those whose
+// surfaces add up to the least, since the surface of a box says how many random lines meet it (Ylitie,
+// Karras, Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs, HPG 2017,
+// section 3.1, with the leaves given). What is below a node of the tree may take one to eight
+// places in a wide node above it; for each number of them the least is found from those of its two
+// halves, from the leaves up.
 #pragma once
 
 #include <algorithm>
@@ -57,8 +57,8 @@ class PartTriangles {
   std::uint32_t ids_[wide];
 };
 
-/// Whether the part is one leaf of the wide tree: one of the tree's, or so few triangles, however
-/// often they are referenced, that they are one block.
+/// Whether the part is one leaf of the wide tree: one of the tree's, or no more triangles than one
+/// block holds, in no more than 32 references.
 inline bool is_leaf(const TreeView& tree, const Part& part) {
   return part.end - part.begin == 1 || PartTriangles(tree, part).fit();
 }
@@ -110,7 +110,8 @@ class Shares {
   std::uint32_t* of_nodes_ = nullptr;
 };
 
-/// The least surface of all wide nodes below a part, by the places that it may take.
+/// The least sum of the surfaces of all wide nodes that a part comes to; with[k]: if it takes no more
+/// than k places in the node above. With one place it is a wide node itself, which counts.
 struct Surfaces {
   double with[wide + 1] = {};
 };
@@ -121,7 +122,7 @@ class Collapse {
   Collapse(const TreeView& tree, const Shares& shares) : tree_(tree), shares_(shares) {}
 
   /// Of a part and all below it. `known(part, area, surfaces)` says whether a part's surfaces are
-  /// known already, and what they are. (A call of itself for each level of the tree.)
+  /// known already, and what they are. (Calls itself, as deep as the tree: max_depth at most.)
   template <class Known>
   Surfaces solve(const Part& part, double area, const Known& known) const {
     Surfaces surfaces;
