@@ -5,7 +5,7 @@
 //
 // It is optional. `widen` makes it from any Tree, whoever built that, and every answer through it
 // has the bits of the query on the tree itself (zkd/query.hpp, whose rules hold here word for
-// word). On one thread it takes 50 to 110 ns for each triangle, and then a ray takes half of the
+// word). On one thread it takes 50 to 150 ns for each triangle, and then a ray takes half of the
 // time or less: it pays once there are about as many rays as triangles. A scene that is traced
 // less, or that changes with every frame, is traced through its Tree.
 //

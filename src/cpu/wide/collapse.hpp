@@ -86,17 +86,28 @@ struct Halves {
 };
 
 /// For each node of the tree and each number of places for what is below it: how many of them go to
-/// its first half.
+/// its first half. Nodes below leaves of the wide tree have none.
 class Shares {
  public:
   Shares() = default;
   explicit Shares(std::uint32_t* of_nodes) : of_nodes_(of_nodes) {}
 
-  /// 0: the node takes one place, as a wide node of its own.
+  /// Whether the node's part is a leaf of the wide tree.
+  [[nodiscard]] bool is_leaf(std::uint32_t node) const { return of_nodes_[node] == leaf; }
+
+  /// Whether the node is passed by, its halves taking the places: else it is a leaf or a wide node.
+  [[nodiscard]] bool is_divided(std::uint32_t node, int places) const {
+    return !is_leaf(node) && (of_nodes_[node] == one_half ||
+                              (places > 1 && first_half(node, places) > 0));
+  }
+  /// Of 2 to 8 places; not where there is one half.
   [[nodiscard]] int first_half(std::uint32_t node, int places) const {
     return static_cast<int>(of_nodes_[node] >> shift(places) & 7u);
   }
-  /// shares[k]: of k places, from 2 to 8 of them. (There is nothing to share of one.)
+
+  void set_leaf(std::uint32_t node) const { of_nodes_[node] = leaf; }
+  void set_one_half(std::uint32_t node) const { of_nodes_[node] = one_half; }
+  /// shares[k]: of k places, from 2 to 8 of them; 0: it takes one place, as a wide node.
   void set(std::uint32_t node, const int (&shares)[wide + 1]) const {
     std::uint32_t bits = 0;
     for (int places = 2; places <= wide; ++places)
@@ -106,6 +117,9 @@ class Shares {
 
  private:
   static int shift(int places) { return 3 * (places - 1); }
+  // Of one place there is nothing to share.
+  static constexpr std::uint32_t leaf = 1;
+  static constexpr std::uint32_t one_half = 2;
 
   std::uint32_t* of_nodes_ = nullptr;
 };
@@ -126,10 +140,18 @@ class Collapse {
   template <class Known>
   Surfaces solve(const Part& part, double area, const Known& known) const {
     Surfaces surfaces;
-    if (is_leaf(tree_, part) || known(part, area, surfaces)) return surfaces;
+    if (part.link.is_leaf() || known(part, area, surfaces)) return surfaces;
+    const std::uint32_t index = part.link.index();
+    if (PartTriangles(tree_, part).fit()) {
+      shares_.set_leaf(index);
+      return surfaces;
+    }
     const Halves halves(tree_, part);
     const Surfaces first = solve(halves.part[0], core::half_area(halves.box[0]), known);
-    if (halves.count == 1) return first;
+    if (halves.count == 1) {
+      shares_.set_one_half(index);
+      return first;
+    }
     const Surfaces second = solve(halves.part[1], core::half_area(halves.box[1]), known);
 
     int shares[wide + 1] = {};
@@ -148,7 +170,7 @@ class Collapse {
       if (alone) shares[places] = 0;
       surfaces.with[places] = alone ? surfaces.with[1] : shared[places];
     }
-    shares_.set(part.link.index(), shares);
+    shares_.set(index, shares);
     return surfaces;
   }
 
@@ -183,15 +205,14 @@ class Children {
   }
 
   void add(const Part& part, const Box& box, int places) {
-    const bool leaf = cpu::is_leaf(tree_, part);
-    if (!leaf && (Halves(tree_, part).count == 1 ||
-                  (places > 1 && shares_.first_half(part.link.index(), places) > 0))) {
+    const bool one = part.link.is_leaf();
+    if (!one && shares_.is_divided(part.link.index(), places)) {
       share(part, places);
       return;
     }
     parts_[count_] = part;
     boxes_[count_] = box;
-    leaves_[count_] = leaf;
+    leaves_[count_] = one || shares_.is_leaf(part.link.index());
     ++count_;
   }
 
