@@ -102,17 +102,19 @@ void expect_cpu_error(const scene::Mesh& mesh, const BuildOptions& options) {
 // ---- What only the device knows -----------------------------------------------------------------
 
 TEST(CudaError, IndexOutOfRange) {
+  int combination = 0;
   for (const References references : {References::once, References::all}) {
-    for (const std::uint32_t bad : {9000u, 9001u, 0x7FFFFFFFu, 0xFFFFFFFFu}) {
+    for (const std::uint32_t bad : {9000u, 9001u, 0x7FFFFFFFu, 0xFFFFFFFFu, 9000u}) {
+      // Five in a row, so that each meets both.
+      const InvalidTriangles invalid =
+          combination++ % 2 == 0 ? InvalidTriangles::error : InvalidTriangles::skip;
       scene::Mesh mesh = scene::soup(3000, 92);
       mesh.faces[2999].x = bad;
       mesh.faces[1234].z = bad;
       mesh.faces[1234].y = bad;
       mesh.positions[30].x = nan_value;
       const BuildOptions options{
-          .references = references,
-          .reference_capacity = 60000,
-          .invalid_triangles = bad % 2 == 0 ? InvalidTriangles::error : InvalidTriangles::skip};
+          .references = references, .reference_capacity = 60000, .invalid_triangles = invalid};
       expect_cpu_error(mesh, options);
       EXPECT_EQ(cpu_error(mesh.view(), options).offender, 1234u);
     }

@@ -70,7 +70,6 @@ struct Branch {
   double area;
   Surfaces surfaces;
 };
-constexpr std::uint32_t most_branches = 4096;
 
 std::uint32_t blocks_for(std::uint32_t references) { return (references + wide - 1) / wide; }
 
@@ -194,19 +193,18 @@ class Widening {
   WideTree run() {
     // 256 subtrees of equal size, or fewer that are worth a thread's while.
     tasks_.largest = std::max<std::uint32_t>(1024, tree_.leaf_count() / 256);
-    const bool divided = tree_.leaf_count() > tasks_.largest;
-    tasks_.capacity = divided ? Tasks::most : 0;
+    if (tree_.leaf_count() > tasks_.largest) tasks_.capacity = Tasks::most;
     std::uint32_t* shares = nullptr;
     const auto take_workspace = [&](core::Arena arena) {
       shares = arena.take<std::uint32_t>(tree_.node_count());
       tasks_.data = arena.take<Task>(tasks_.capacity);
-      branches_ = arena.take<Branch>(divided ? most_branches : 0);
+      branches_ = arena.take<Branch>(tasks_.capacity);
       return arena.used();
     };
     const core::HostBlock workspace(memory_, take_workspace(core::Arena()));
     take_workspace(core::Arena(workspace.data()));
 
-    collapse(Shares(shares), divided ? most_branches : 0);
+    collapse(Shares(shares));
     Place end = lay_out_top();
     for_each_task([this](Task& task) { layout_.lay_out(task.subtree, task.place, nullptr); });
     layout_.check_references();
@@ -244,14 +242,14 @@ class Widening {
   // Branches first, each by one thread, then what is above them. The top is gone through twice, in
   // the same order: to name the branches (what is written of it then means nothing), and with what
   // they have come to. Branches beyond the most there is room for are left to the top.
-  void collapse(const Shares& shares, std::uint32_t most) {
+  void collapse(const Shares& shares) {
     layout_.collapse_by(shares);
     if (is_one_leaf()) return;
     const Collapse collapse(tree_, shares);
     const auto none = [](const Part&, double, Surfaces&) { return false; };
     std::uint32_t count = 0;
     const auto is_branch = [&](const Part& part) {
-      return count < most && part.end - part.begin <= tasks_.largest;
+      return count < tasks_.capacity && part.end - part.begin <= tasks_.largest;
     };
     const auto name = [&](const Part& part, double area, Surfaces&) {
       if (!is_branch(part)) return false;
@@ -263,7 +261,7 @@ class Widening {
       surfaces = branches_[count++].surfaces;
       return true;
     };
-    if (most > 0) collapse.solve(root_.part, 0.0, name);
+    if (tasks_.capacity > 0) collapse.solve(root_.part, 0.0, name);
     threads_.share(count, 1, [this, &collapse, none](Range range) {
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
         Branch& branch = branches_[i];

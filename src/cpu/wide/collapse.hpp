@@ -142,7 +142,7 @@ class Collapse {
     Surfaces surfaces;
     if (part.link.is_leaf() || known(part, area, surfaces)) return surfaces;
     const std::uint32_t index = part.link.index();
-    if (PartTriangles(tree_, part).fit()) {
+    if (is_leaf(tree_, part)) {
       shares_.set_leaf(index);
       return surfaces;
     }
