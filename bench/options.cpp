@@ -167,8 +167,9 @@ std::optional<Options> parse_options(int argc, const char* const* argv) {
   const auto fraction = [&](const char* name, double& value, const char* help) {
     app.add_option(name, value, help)->group(build)->type_name("F")->capture_default_str();
   };
-  fraction("--budget", budget, "References per triangle at most, for `budget`");
-  number(build, "--leaf-size", leaf_size, "Triangles in a leaf at most; 0: 4, for `all` 8", 0,
+  fraction("--budget", budget,
+           "References per triangle at most, for `budget`; fragments that decide cells of `all`");
+  number(build, "--leaf-size", leaf_size, "Triangles in a leaf at most; 0: 4, for `all` 12", 0,
          1024);
   number(build, "--code-bits", code_bits, "Bits of a Morton code; 0: by triangle count", 0, 64);
   text(build, "--axis-order", axis_order,

@@ -292,7 +292,7 @@ TEST_F(BenchCli, JsonHasEveryKeyOfTheSchema) {
     }
     for (const Json& not_skipped : result["not_skipped"]) expect_keys(not_skipped, {"what", "why"});
     const bool strict = result["options"]["references"] == "all";
-    EXPECT_EQ(result["skipped"].size() + result["not_skipped"].size(), strict ? 6u : 5u);
+    EXPECT_EQ(result["skipped"].size() + result["not_skipped"].size(), strict ? 7u : 5u);
     ASSERT_EQ(result["stages_bytes"].size(), result["stages_ms"].size());
     for (const auto& [stage, bytes] : result["stages_bytes"].items()) {
       if (stage == "split" || stage == "clusters") {

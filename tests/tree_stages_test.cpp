@@ -77,7 +77,9 @@ TEST(TreeStages, GiveTheBytesOfABuild) {
             SCOPED_TRACE(m.name + ", " + std::to_string(code_bits) + " bits, leaf size " +
                          std::to_string(leaf_size) + ", " + to_string(order) +
                          (recode ? "" : ", not coded again"));
-            for (const References references : {References::once, References::all})
+            const References policies[] = {number % 3 != 0 ? References::once : References::budget,
+                                           References::all};
+            for (const References references : policies)
               expect_equals_composition(m.mesh.view(),
                                         {.references = references,
                                          .leaf_size = leaf_size,
@@ -108,6 +110,8 @@ TEST(TreeStages, GiveTheBytesOfABuildOfCrowdedScenes) {
 TEST(TreeStages, GiveTheBytesOfABuildOfLargerScenes) {
   expect_equals_composition(scene::soup(50000, 2).view(), {});
   expect_equals_composition(scene::soup(50000, 2).view(), {.references = References::all});
+  expect_equals_composition(scene::small_in_large(20000, 1e4F, 2).view(),
+                            {.references = References::all});
   expect_equals_composition(scene::small_in_large(20000, 1e4F, 2).view(), {});
   expect_equals_composition(scene::sphere(6).view(), {.code_bits = 64});
 }

@@ -22,9 +22,10 @@ enum class References {
   budget,  ///< triangles whose boxes hold much besides them are split on planes of the lattice, the
            ///< most useful first, until BuildOptions::budget is used (Karras, Aila, HPG 2013); each
            ///< part is then listed once, as a triangle of its own would be
-  all,     ///< in every leaf cell it touches: a strict kd-tree with disjoint cells. (Builder::sah
-           ///< and wu2011: that a piece of it with an area lies in; if it lies in a plane, on one
-           ///< side)
+  all,     ///< in every leaf cell it touches: a strict kd-tree with disjoint cells. Where large
+           ///< triangles lie among small ones, cells are those of the fragments that `budget` would
+           ///< list. (Builder::sah and wu2011: in every cell that a piece of it with an area lies
+           ///< in; if it lies in a plane, on one side)
   automatic,  ///< `budget` where the boxes of the scene are so uneven that splitting pays, else
               ///< `once`: scans keep one reference each. Tree::options() says which it was
 };
@@ -112,17 +113,18 @@ struct BuildOptions {
 
   /// `balanced` takes a part of the node visits of `fast` off primary rays (Bunny 15 of 100,
   /// Sibenik 26, Conference 41) for 1.2 to 2.6 times the time to build. Codes then have 46 to 51
-  /// bits at most. With References::all it is no gain.
+  /// bits at most.
   Quality quality = Quality::fast;
 
-  /// `once` takes about a tenth of the time to build that `all` takes (Bunny, Sibenik). `all` has
-  /// what only a strict kd-tree gives: disjoint cells.
+  /// `all` takes four to nine times as long to build as `once`. It has what only a strict kd-tree
+  /// gives: disjoint cells, and so fewer node visits.
   References references = References::once;
 
   /// References per valid triangle that `budget` may use, counted over the whole scene and never
   /// exceeded; finite, at least 1. 1.3 took a third off the node visits and half off the triangle
   /// tests in Conference; twice as much gained little more. No triangle is cut into more than
-  /// 1024. Room for all that this allows is made before the scene is known.
+  /// 1024. Room for all that this allows is made before the scene is known. `all` is not bounded by
+  /// it: so many fragments decide where its cells are.
   float budget = 1.3F;
 
   /// References that a CUDA build of `all` makes room for, at most max_count: there memory is taken
@@ -133,13 +135,12 @@ struct BuildOptions {
   std::uint64_t reference_capacity = 0;
 
   /// A trunk is the largest range of neighbouring codes with at most this many triangles; 1 to
-  /// 1024, or 0: 4, with `all` 8. With `all` a leaf that lists more than four times as many is
+  /// 1024, or 0: 4, with `all` 12. With `all` a leaf that lists more than eight times as many is
   /// split again, by what lies in its cell, into trunks of twice as many, unless the boxes of what
   /// lies there are nearly the same. Of 1, 2, 4 and 8, 4 was
-  /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; `all` was
-  /// built 1.3 to 1.8 times as fast with 8 as with 4 in 0.5 to 0.6 of the memory, and traced as a
-  /// wide tree within a tenth of the speed (Bunny, Sibenik, Conference), as a binary one at 0.8 to
-  /// 0.9 of it (Bunny, Sibenik). Time of the trunk stage grows with it.
+  /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; as wide trees,
+  /// `all` with 8, 12 and 16 was traced alike, as binary ones with 12 at 0.87 to 0.99 of the speed
+  /// of 8 (five scenes). Time of the trunk stage grows with it.
   std::uint32_t leaf_size = 0;
 
   /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. With 32

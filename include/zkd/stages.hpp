@@ -57,6 +57,36 @@ ZKD_API SceneSummary triangle_boxes(const Executor& executor, const TriangleView
 [[nodiscard]] ZKD_API Lattice make_lattice(const Box& bounds, std::uint32_t code_bits,
                                            AxisOrder order = AxisOrder::by_extent);
 
+/// Between stages 2 and 3: whether build() splits triangles before it codes them, by `policy`:
+/// never for `once`, always for `budget`; for `automatic` and `all` where the scene is uneven:
+/// where large triangles lie among small ones, for `all` from less on, but not where dozens of
+/// boxes lie in each other. `boxes` are stage 1's. Equal for every order of the triangles. O(n).
+template <class Executor = cpu::Executor>
+[[nodiscard]] ZKD_API bool pays_to_split(const Executor& executor, std::span<const Box> boxes,
+                                         References policy);
+
+/// What split_triangles() made.
+struct Fragments {
+  std::uint32_t places = 0;  ///< some of which may stay empty: not every triangle can be cut often
+  std::uint32_t count = 0;   ///< boxes that are not empty
+};
+
+/// Between stages 2 and 3, where it pays: triangles whose boxes hold much besides them are cut on
+/// planes of the lattice, the most useful first (Karras, Aila, HPG 2013, section 4), into at most
+/// `budget` fragments for each box that is not empty, as BuildOptions::budget says.
+///
+/// fragments[k] becomes the box of fragment k, or an empty one, owners[k] its triangle, in order of
+/// triangles; as many are written as fit, so a call with empty spans asks for their number. From
+/// there on fragments are coded, sorted and made trunks of in place of triangles: `boxes` of stages
+/// 3 and 5 are theirs, and n is Fragments::count. `boxes` here are stage 1's, `lattice` stage 2's,
+/// over all of them.
+///
+/// Throws Error invalid_view. O(n + fragments).
+template <class Executor = cpu::Executor>
+ZKD_API Fragments split_triangles(const Executor& executor, const TriangleView& triangles,
+                                  std::span<const Box> boxes, const Lattice& lattice, float budget,
+                                  std::span<Box> fragments, std::span<std::uint32_t> owners);
+
 /// Stage 3, Morton encoding: codes of the centres of the boxes that are not empty, in their order,
 /// and the indices of those boxes in `ids`. Both spans are as long as there are such boxes
 /// (SceneSummary::valid); the centres must lie inside the lattice. Codes are right-aligned: the low
@@ -135,13 +165,16 @@ ZKD_API void split_planes(const Executor& executor, std::span<const TrunkKey> tr
 
 /// What stages 5 to 9 made, for the last two: non-owning, all from one run.
 struct Skeleton {
-  std::span<const std::uint32_t> ids;    ///< triangles in the order of their keys
+  std::span<const std::uint32_t> ids;    ///< triangles, or fragments, in the order of their keys
   std::span<const std::uint32_t> first;  ///< stage 6, as many as there are trunks
   std::span<const std::uint8_t> levels;  ///< stage 7
   std::span<const Link> children;        ///< stage 8
   Link root;                             ///< stage 8
   std::span<const std::uint32_t> axes;   ///< stage 9
   std::span<const float> planes;         ///< stage 9
+  /// Triangle of each fragment, as split_triangles() wrote them; none where no triangle was split,
+  /// and ids are those of triangles.
+  std::span<const std::uint32_t> owners{};
 };
 
 /// Stage 10, references: which triangles each leaf (trunk) lists, by `policy`, once or all. Leaf t
@@ -149,10 +182,12 @@ struct Skeleton {
 /// are trunks. Returns how many references there are; as many are written as fit into `references`,
 /// so a call with an empty span asks for the number. With `all`, `inside` gets the box of what of
 /// each reference lies in its leaf's cell, in tree space, as many as fit. `boxes` are stage 1's,
-/// `lattice` stage 2's.
+/// `lattice` stage 2's. Where triangles were split, a leaf lists a triangle once, however many of
+/// its fragments it has: so `once` over fragments is what `budget` builds.
 ///
 /// Throws Error too_many_references, unsupported_option; and invalid_view where an index in the
-/// skeleton is out of range. O(triangles) for once, O((triangles + references) * depth) for all.
+/// skeleton is out of range. O(triangles) for once (with fragments times those in a leaf, up to
+/// 1024), O((triangles + references) * depth) for all.
 template <class Executor = cpu::Executor>
 ZKD_API std::uint64_t list_references(const Executor& executor, const TriangleView& triangles,
                                       std::span<const Box> boxes, const Skeleton& skeleton,
@@ -176,7 +211,7 @@ struct SplitLeaves {
   std::uint32_t references = 0;
 };
 
-/// Stage 10 again, crowded leaves of `all`: those that list more than 4 * leaf_size triangles are
+/// Stage 10 again, crowded leaves of `all`: those that list more than 8 * leaf_size triangles are
 /// split, unless the boxes of what lies in the cell are nearly the same: their areas add up to 7/8
 /// or more of that of the box about them, times their number. What of them lies in the cell
 /// (`inside`, with `leaf_offsets` and `references` as list_references() made them) is coded by the
@@ -195,7 +230,9 @@ ZKD_API SplitLeaves split_crowded_leaves(
     std::span<const Box> inside, std::uint32_t leaf_size, AxisOrder order, const StrictArrays& out);
 
 /// Stage 11, tight boxes, of `once`: writes the finished nodes, with links, planes in tree space,
-/// and the boxes of what is inside each child. O(references + trunks).
+/// and the boxes of what is inside each child. Where triangles were split, `boxes` are those of
+/// fragments, and so are `references`: the skeleton's ids, with stage 6's `first`, and the end, as
+/// `leaf_offsets`. O(references + trunks).
 ///
 /// Throws Error invalid_view where an index is out of range.
 template <class Executor = cpu::Executor>

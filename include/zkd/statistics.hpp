@@ -17,7 +17,7 @@ namespace zkd {
 /// boxes) and references (from the parts of all threads to one tree).
 enum class Stage : std::uint8_t {
   validate,          ///< checks, triangle boxes, scene box, lattice
-  split,             ///< triangles cut into fragments, with References::budget
+  split,             ///< triangles cut into fragments, where that is done
   encode,            ///< Morton codes
   sort,              ///< stable radix sort on the codes
   clusters,          ///< the upper part of the tree by SAH, with Quality::balanced
@@ -39,7 +39,7 @@ enum class Skip : std::uint8_t {
   radix_passes,  ///< digits equal in every code; amount: passes left out
   flat_axes,     ///< axes without extent get no bits; amount: axes
   wide_codes,    ///< few triangles: 32-bit codes instead of 64; amount: bits
-  splitting,     ///< even boxes: no triangle is split, with References::automatic; amount: 1
+  splitting,     ///< with References::automatic or all: no triangle is split; amount: 1
   recoding,      ///< no crowded trunk, no second round; amount: 1
   compaction,    ///< no triangle left out, ids need no renumbering; amount: 1
   subtrees,      ///< no crowded leaf, none is split, with References::all; amount: 1
@@ -75,7 +75,7 @@ struct Statistics {
                                          ///< without BuildOptions::recode_crowded
   std::uint64_t crowded_triangles = 0;   ///< triangles in them
   std::uint64_t crowded_leaves = 0;      ///< leaves of `all` that were coded again, because they
-                                         ///< listed more than 4 * leaf_size triangles
+                                         ///< listed more than 8 * leaf_size triangles
   std::uint64_t crowded_references = 0;  ///< references that they had
   std::uint64_t nodes = 0;               ///< inner nodes
   std::uint64_t leaves = 0;

@@ -12,6 +12,7 @@
 
 #include "core/compress.hpp"
 #include "core/frame.hpp"
+#include "core/listed_parts.hpp"
 
 namespace zkd::core {
 
@@ -24,7 +25,7 @@ struct TightBoxes {
   const Parent* parents_of_nodes;
   const Parent* parents_of_leaves;
   const SceneFrame* frame;
-  const Box* inside;             ///< `all`: what lies in the cells, in tree space; or null
+  ListedParts listed;            ///< `all`: what lies in the cells; else nothing
   const std::uint32_t* numbers;  ///< of references among those; null: 0, 1, 2, ...
   Node* nodes;
 
@@ -41,7 +42,12 @@ struct TightBoxes {
 
   /// Announces that begin(leaf) will follow: boxes lie in the order of the input, not of leaves.
   [[gnu::always_inline]] void prefetch(std::uint32_t leaf) const {
-    if (inside != nullptr) return;  // those lie in the order of the leaves
+    if (listed.inside != nullptr) {
+      if (numbers == nullptr) return;  // they lie in the order of the leaves
+      for (std::uint32_t r = leaf_offsets[leaf]; r < leaf_offsets[leaf + 1]; ++r)
+        __builtin_prefetch(&listed.box(numbers[r]));
+      return;
+    }
     for (std::uint32_t r = leaf_offsets[leaf]; r < leaf_offsets[leaf + 1]; ++r)
       __builtin_prefetch(boxes + references[r]);
   }
@@ -49,9 +55,9 @@ struct TightBoxes {
   ZKD_HOST_DEVICE Parent begin(std::uint32_t leaf) const {
     const Parent parent = parents_of_leaves[leaf];
     Box box;
-    if (inside != nullptr) {
+    if (listed.inside != nullptr) {
       for (std::uint32_t r = leaf_offsets[leaf]; r < leaf_offsets[leaf + 1]; ++r)
-        include(box, inside[numbers != nullptr ? numbers[r] : r]);
+        include(box, listed.box(numbers != nullptr ? numbers[r] : r));
       return leave(parent, box);
     }
     const float scale = static_cast<float>(frame->scale);

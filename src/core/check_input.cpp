@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "core/trunks.hpp"
+
 namespace zkd::core {
 namespace {
 
@@ -41,7 +43,7 @@ void check_ranges(const BuildOptions& options) {
   check(options.invalid_triangles, InvalidTriangles::skip, "invalid_triangles");
   check(options.axis_order, AxisOrder::cyclic, "axis_order");
   check(options.backend, Backend::cuda, "backend");
-  if (options.leaf_size > 1024)
+  if (options.leaf_size > most_leaf_size)
     fail(ErrorCode::invalid_option, options.leaf_size,
          "leaf_size is " + std::to_string(options.leaf_size) +
              "; it must be 1 to 1024, or 0 for automatic");

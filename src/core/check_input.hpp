@@ -27,7 +27,7 @@ ZKD_API void check_count(std::uint64_t triangle_count);
 [[nodiscard]] constexpr BuildOptions settled(const BuildOptions& options) {
   BuildOptions all = options;
   all.builder = builder_for(options);
-  if (all.leaf_size == 0) all.leaf_size = options.references == References::all ? 8 : 4;
+  if (all.leaf_size == 0) all.leaf_size = options.references == References::all ? 12 : 4;
   return all;
 }
 

@@ -27,7 +27,7 @@ namespace zkd::core {
 
 /// A leaf is crowded where it lists more than this many times leaf_size. It costs all those tests;
 /// a subtree costs visits and lists its triangles more than once.
-inline constexpr std::uint32_t crowded_factor = 4;
+inline constexpr std::uint32_t crowded_factor = 8;
 
 /// Trunks of references hold at most this many times leaf_size.
 inline constexpr std::uint32_t reference_trunk_factor = 2;
@@ -188,10 +188,24 @@ struct PlaceSplitPlaneAgain {
   }
 };
 
-/// Walks the cells of a crowded leaf's subtree that a reference of the leaf touches, as CellWalk.
+/// Where the references of crowded leaves are, in the order of the leaves.
+struct PlaceOfCrowded {
+  CrowdedTriangles crowded;
+  std::uint32_t* positions;
+  std::uint32_t last_leaf = 0;  // of the reference before: most follow in the same
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t k) {
+    if (!crowded.holds(last_leaf, k)) last_leaf = crowded[k].trunk;
+    positions[k] = crowded.position(last_leaf, k);
+  }
+};
+
+/// Walks the cells of a crowded leaf's subtree that the k-th reference of those leaves touches, as
+/// CellWalk.
 struct ReferenceWalk {
   CellWalk walk;
-  const std::uint32_t* numbers;  ///< of references, in the order of leaves and codes
+  const std::uint32_t* positions;  ///< in the order of leaves and codes
+  const std::uint32_t* numbers;
   const std::uint32_t* triangles;
   const Box* inside;
   const std::uint32_t* trunk_of;
@@ -199,65 +213,118 @@ struct ReferenceWalk {
   const Parent* parents_of_nodes;
   const Parent* parents_of_leaves;
 
-  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t id(std::uint32_t i) const {
-    return triangles[numbers[i]];
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t id(std::uint32_t k) const {
+    return triangles[numbers[positions[k]]];
   }
 
   template <class Visit>
-  ZKD_HOST_DEVICE void operator()(std::uint32_t i, Visit& visit) const {
-    Link link = Link::leaf(trunk_of[i]);
-    Parent parent = parents_of_leaves[trunk_of[i]];
+  ZKD_HOST_DEVICE void operator()(std::uint32_t k, Visit& visit) const {
+    const std::uint32_t trunk = trunk_of[positions[k]];
+    Link link = Link::leaf(trunk);
+    Parent parent = parents_of_leaves[trunk];
     while (!parent.is_none() && levels[parent.node()] >= first_reference_level) {
       link = Link::node(parent.node());
       parent = parents_of_nodes[parent.node()];
     }
+    const Box& box = inside[numbers[positions[k]]];
     if (link.is_leaf())
-      visit(link.index(), inside[numbers[i]]);
+      visit(link.index(), box);
     else
-      walk.below(id(i), link, walk.place(id(i)), inside[numbers[i]], visit);
+      walk.below(id(k), link, walk.place(id(k)), box, visit);
   }
 };
 
-/// Puts what was found of the references of one leaf in the order of the leaves that it became:
-/// they follow one another, and so do those leaves.
-struct SortWithinLeaf {
+/// What the leaves list from now on: crowded ones what was found below them, the others what they
+/// did.
+struct LeafLists {
+  const std::uint32_t* offsets;  ///< of leaves, and the end, as they were
+  std::uint32_t crowded;
+  CrowdedTriangles members;            ///< references of crowded leaves, by walk
+  const std::uint32_t* found_offsets;  ///< by walk: what it found first
+  const std::uint32_t* walk_count;
+  const std::uint64_t* found_count;
+
+  struct Range {
+    std::uint32_t begin;
+    std::uint32_t end;
+  };
+  [[nodiscard]] ZKD_HOST_DEVICE Range before(std::uint32_t leaf) const {
+    return {offsets[leaf], offsets[leaf + 1]};
+  }
+  [[nodiscard]] ZKD_HOST_DEVICE bool is_crowded(std::uint32_t leaf) const {
+    return offsets[leaf + 1] - offsets[leaf] > crowded;
+  }
+  /// What was found below a crowded leaf.
+  [[nodiscard]] ZKD_HOST_DEVICE Range found(std::uint32_t leaf) const {
+    const std::uint32_t c = last_at_or_before(members.first, *members.trunks, offsets[leaf]);
+    const std::uint32_t first = members.offsets[c];
+    return {first_found(first), first_found(first + (offsets[leaf + 1] - offsets[leaf]))};
+  }
+
+ private:
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t first_found(std::uint32_t k) const {
+    return k < *walk_count ? found_offsets[k] : static_cast<std::uint32_t>(*found_count);
+  }
+};
+
+struct CountListed {
+  LeafLists lists;
+  ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t leaf) const {
+    const LeafLists::Range range = lists.is_crowded(leaf) ? lists.found(leaf) : lists.before(leaf);
+    return range.end - range.begin;
+  }
+};
+
+/// Puts the references of one leaf where they belong, those found below a crowded one in the order
+/// of the leaves that it became: they follow one another, and so do those leaves.
+struct PlaceReferences {
+  LeafLists lists;
+  const std::uint32_t* list_offsets;  ///< by leaf
+  const std::uint32_t* numbers_before;
   const std::uint32_t* leaf_count;
   const std::uint32_t* trunk_count;
   const std::uint32_t* trunk_offsets;  ///< by leaf: its first trunk
-  const std::uint32_t* walk_offsets;   ///< by leaf: its first walk
-  const std::uint32_t* found_offsets;  ///< by walk: what it found first
-  const std::uint32_t* walk_count;
-  const std::uint32_t* found_count;
-  const std::uint32_t* found_in;  ///< which trunk
+  const std::uint32_t* found_in;       ///< which trunk
   std::uint32_t* numbers;
   std::uint32_t* offsets;  ///< of trunks
   std::uint32_t* next;     ///< likewise: where the next goes
 
-  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t first_found(std::uint32_t leaf) const {
-    const std::uint32_t at = walk_offsets[leaf];
-    return at < *walk_count ? found_offsets[at] : *found_count;
-  }
-
   ZKD_HOST_DEVICE void operator()(std::uint32_t leaf) const {
     const std::uint32_t first = trunk_offsets[leaf];
+    std::uint32_t place = list_offsets[leaf];
+    if (!lists.is_crowded(leaf)) {
+      const LeafLists::Range range = lists.before(leaf);
+      offsets[first] = place;
+      for (std::uint32_t i = range.begin; i < range.end; ++i) numbers[place++] = numbers_before[i];
+      return;
+    }
     const std::uint32_t last = leaf + 1 < *leaf_count ? trunk_offsets[leaf + 1] : *trunk_count;
-    const std::uint32_t begin = first_found(leaf);
-    const std::uint32_t end = first_found(leaf + 1);
+    const LeafLists::Range range = lists.found(leaf);
     for (std::uint32_t t = first; t < last; ++t) next[t] = 0;
-    for (std::uint32_t i = begin; i < end; ++i) ++next[found_in[i]];
-    std::uint32_t place = begin;
+    for (std::uint32_t i = range.begin; i < range.end; ++i) ++next[found_in[i]];
     for (std::uint32_t t = first; t < last; ++t) {
       offsets[t] = place;
       place += next[t];
       next[t] = offsets[t];
     }
-    for (std::uint32_t i = begin; i < end; ++i) numbers[next[found_in[i]]++] = i;
+    for (std::uint32_t i = range.begin; i < range.end; ++i)
+      numbers[next[found_in[i]]++] = i | found_again;
+  }
+};
+
+/// As LabelTrunk, for trunks of crowded leaves alone: others are not looked for.
+struct LabelReferenceTrunk {
+  LabelTrunk label;
+  const std::uint32_t* leaves;
+  LeafLists lists;
+  ZKD_HOST_DEVICE void operator()(std::uint32_t trunk) const {
+    if (lists.is_crowded(leaves[trunk])) label(trunk);
   }
 };
 
 /// Memory of what is needed before it is known whether a leaf is crowded.
 struct CrowdedLeavesWorkspace {
-  std::uint32_t* scratch[2];
+  std::uint32_t* scratch[2];  ///< then of crowded references: positions, offsets of what they find
   std::uint8_t* levels_left;
 
   void lay_out(Arena& arena, std::size_t references, std::size_t leaves) {
@@ -269,10 +336,12 @@ struct CrowdedLeavesWorkspace {
 /// Where trunks of references begin, by leaf.
 struct ReferenceTrunkWorkspace {
   std::uint32_t* offsets;
-  std::uint32_t* trunk_of;
+  std::uint32_t* list_offsets;  ///< where the references of each leaf go
+  std::uint32_t* trunk_of;      ///< of the references of crowded leaves
 
   void lay_out(Arena& arena, std::size_t references, std::size_t leaves) {
     offsets = arena.take<std::uint32_t>(leaves);
+    list_offsets = arena.take<std::uint32_t>(leaves);
     trunk_of = arena.take<std::uint32_t>(references);
   }
 };
@@ -300,22 +369,28 @@ struct SubtreeWorkspace {
   }
 };
 
-/// References of the smaller leaves.
-struct SplitReferenceWorkspace {
+/// What was found below crowded leaves.
+struct FoundAgainWorkspace {
   std::uint32_t* found_in;
-  std::uint32_t* numbers;
   std::uint32_t* ids;
   Box* inside;
+
+  void lay_out(Arena& arena, std::size_t found) {
+    found_in = arena.take<std::uint32_t>(found);
+    ids = arena.take<std::uint32_t>(found);
+    inside = arena.take<Box>(found);
+  }
+};
+
+/// References of the smaller leaves.
+struct SplitReferenceWorkspace {
+  std::uint32_t* numbers;
   std::uint32_t* offsets;
 
   void lay_out(Arena& arena, std::size_t references, std::size_t leaves) {
-    found_in = arena.take<std::uint32_t>(references);
     numbers = arena.take<std::uint32_t>(references);
-    ids = arena.take<std::uint32_t>(references);
-    inside = arena.take<Box>(references);
     offsets = arena.take<std::uint32_t>(leaves + 1);
   }
-  [[nodiscard]] FoundReferences found() const { return {found_in, ids, inside}; }
 };
 
 /// The most leaves that `references` in `leaves` leaves can be split into.
@@ -341,10 +416,10 @@ struct SplitCrowdedLeaves {
     const std::uint32_t crowded = crowded_factor * leaf_size;
     CrowdedLeavesWorkspace room{};
     backend.take(room, backend.size(references), backend.size(leaves));
-    backend.for_each(
-        leaves, LevelsLeft{tree.offsets, crowded, tree.numbers, tree.inside, tree.parents_of_leaves,
-                           tree.parents_of_nodes, room.levels_left});
-    SecondRound<std::uint32_t, Backend> round{tree.inside,
+    backend.for_each(leaves,
+                     LevelsLeft{tree.offsets, crowded, tree.numbers, tree.listed.inside,
+                                tree.parents_of_leaves, tree.parents_of_nodes, room.levels_left});
+    SecondRound<std::uint32_t, Backend> round{tree.listed.inside,
                                               tree.leaf_of,
                                               tree.numbers,
                                               references,
@@ -395,30 +470,50 @@ struct SplitCrowdedLeaves {
                                           {work.first, round.work.first, &counts->crowded_leaves,
                                            round.work.lattices, round.work.coders},
                                           work.nodes});
-    backend.for_each(split,
-                     LabelTrunk{work.first, &counts->trunks, references.actual, by_leaf.trunk_of});
+    const Count crowded_references{&counts->crowded_references, references.bound};
+    std::uint32_t* positions = room.scratch[0];
+    std::uint32_t* found_offsets = room.scratch[1];
+    const LeafLists lists{tree.offsets,
+                          crowded,
+                          round.members(),
+                          found_offsets,
+                          crowded_references.actual,
+                          &counts->found_again_needed};
+    backend.for_each(split, LabelReferenceTrunk{
+                                {work.first, &counts->trunks, references.actual, by_leaf.trunk_of},
+                                work.leaves,
+                                lists});
+    backend.for_each(crowded_references, PlaceOfCrowded{round.members(), positions});
 
     CellWalk below = walk;
     below.nodes = work.nodes;
     const ReferenceWalk again{below,
+                              positions,
                               tree.numbers,
-                              tree.ids,
-                              tree.inside,
+                              tree.listed.ids,
+                              tree.listed.inside,
                               by_leaf.trunk_of,
                               work.levels,
                               work.parents_of_nodes,
                               work.parents_of_leaves};
-    SplitReferenceWorkspace found{};
-    const std::uint32_t* found_offsets = room.scratch[0];
-    const Count listed =
-        FindReferences<ReferenceWalk, Backend>{again,  references,          remembered_of_reference,
-                                               counts, &counts->references, room.scratch[0]}
-            .run(backend, view, split, found);
-    backend.for_each(leaves,
-                     SortWithinLeaf{&counts->first_trunks, &counts->trunks, by_leaf.offsets,
-                                    tree.offsets, found_offsets, references.actual, listed.actual,
-                                    found.found_in, found.numbers, found.offsets, work.arrivals});
-    backend.for_each(one, CloseOffsets{&counts->trunks, listed.actual, found.offsets});
+    FindReferences<ReferenceWalk, Backend> find{again, crowded_references, remembered_of_reference,
+                                                found_offsets};
+    find.count(backend, &counts->found_again_needed);
+    backend.for_each(one, AdmitFoundAgain{counts});
+    backend.raise(&counts->status, view);
+    backend.exclusive_scan(leaves, CountListed{lists}, by_leaf.list_offsets,
+                           &counts->references_needed);
+    const Count listed = admit_references(backend, counts, &counts->references, view);
+    FoundAgainWorkspace found{};
+    backend.take(found, backend.size(Count{&counts->found_again, listed.bound}));
+    find.write(backend, &counts->found_again, {found.found_in, found.ids, found.inside});
+    SplitReferenceWorkspace placed{};
+    backend.take(placed, backend.size(listed), backend.size(split));
+    backend.for_each(
+        leaves, PlaceReferences{lists, by_leaf.list_offsets, tree.numbers, &counts->first_trunks,
+                                &counts->trunks, by_leaf.offsets, found.found_in, placed.numbers,
+                                placed.offsets, work.arrivals});
+    backend.for_each(one, CloseOffsets{&counts->trunks, listed.actual, placed.offsets});
     tree.leaves = {&counts->trunks, most_leaves};
     tree.inner = nodes;
     tree.nodes = work.nodes;
@@ -426,11 +521,11 @@ struct SplitCrowdedLeaves {
     tree.parents_of_leaves = work.parents_of_leaves;
     tree.arrivals = work.arrivals;
     tree.references = listed;
-    tree.offsets = found.offsets;
+    tree.offsets = placed.offsets;
     tree.leaf_of = nullptr;
-    tree.numbers = found.numbers;
-    tree.ids = found.ids;
-    tree.inside = found.inside;
+    tree.numbers = placed.numbers;
+    tree.listed.ids_again = found.ids;
+    tree.listed.inside_again = found.inside;
   }
 };
 

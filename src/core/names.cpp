@@ -62,15 +62,14 @@ const char* reason(Skip skip, bool taken) noexcept {
   return taken ? name_of(
                      std::array{"every code has the same digit there", "nothing extends along them",
                                 "few triangles: short codes tell them apart",
-                                "boxes of much the same size: splitting would not pay",
+                                "boxes of much the same size, or all in each other",
                                 "no crowded trunk", "no triangle left out", "no crowded leaf"},
                      skip)
                : name_of(
                      std::array{"codes differ in every digit", "the scene extends along every axis",
                                 "many triangles: short codes would crowd them",
-                                "boxes of very different sizes: triangles were split",
-                                "trunks are crowded",
-                                "triangles were left out, the others have to close up",
+                                "boxes of different sizes: triangles were split",
+                                "trunks are crowded", "triangles were left out or split",
                                 "crowded leaves were split"},
                      skip);
 }

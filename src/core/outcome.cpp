@@ -53,8 +53,8 @@ Statistics describe(const BuildState& state, const BuildOptions& options, std::u
   report(Skip::flat_axes, true, flat);
   report(Skip::wide_codes, may_be_narrow,
          may_be_narrow && state.report.valid < wide_code_threshold ? 32 : 0);
-  report(Skip::splitting, options.references == References::automatic,
-         options.references == References::automatic && counts.splits == 0 ? 1 : 0);
+  const bool may_split = splits_if_uneven(options.references);
+  report(Skip::splitting, may_split, may_split && counts.splits == 0 ? 1 : 0);
   report(Skip::recoding, options.recode_crowded,
          options.recode_crowded && counts.crowded_trunks == 0 ? 1 : 0);
   report(Skip::compaction, true, state.report.valid == triangles && counts.splits == 0 ? 1 : 0);

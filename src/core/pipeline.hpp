@@ -97,6 +97,11 @@ struct SkeletonWorkspace {
   void lay_out(Arena& arena, std::size_t leaves) { nodes = arena.take<SplitNode>(leaves); }
 };
 
+/// Whether triangles may have to be split.
+inline bool may_split(const BuildOptions& options) {
+  return options.references != References::once;
+}
+
 /// Counts and frame from what validation found; or the end of the build.
 ZKD_HOST_DEVICE inline void admit_scene(BuildState& state, const TriangleView& triangles,
                                         InvalidTriangles invalid) {
@@ -121,14 +126,14 @@ struct PrepareScene {
   InvalidTriangles invalid;
   bool clusters;
   References references;
-  const std::uint32_t* sizes;  ///< for References::automatic
+  const std::uint32_t* sizes;  ///< where the scene decides whether triangles are split
 
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
     admit_scene(*state, triangles, invalid);
     const std::uint32_t valid = state->report.valid;
-    const bool splits = references == References::automatic
-                            ? is_uneven(sizes, state->report.bounds, valid)
-                            : references == References::budget;
+    bool splits = references == References::budget;
+    if (splits_if_uneven(references))
+      splits = is_uneven(references, unevenness_of(sizes, state->report.bounds, valid));
     state->counts.splits = splits ? 1 : 0;
     std::uint32_t code_bits = choose_code_bits(code_bits_asked, valid);
     if (clusters) code_bits = code_bits_below_path(code_bits, valid);
@@ -160,11 +165,6 @@ struct WriteHeader {
   }
 };
 
-/// Whether triangles may have to be split; with References::automatic the scene decides.
-inline bool may_split(const BuildOptions& options) {
-  return options.references == References::budget || options.references == References::automatic;
-}
-
 /// What is coded and sorted: triangles, or at most so many fragments of them.
 inline std::uint32_t most_elements(const BuildOptions& options, std::uint32_t triangles) {
   return may_split(options) ? most_fragments(options.budget, triangles) : triangles;
@@ -190,7 +190,7 @@ class MortonPipeline {
     counts_ = &work.state->counts;
 
     validate(work);                              // 1 validate.hpp, 2 lattice.hpp
-    split(work);                                 //   split.hpp: with a budget of references
+    split(work);                                 //   split.hpp: unless for `once`
     encode(work);                                // 3 morton.hpp
     sort(work);                                  // 4 a verb of the backend
     arrange(work);                               //   clusters.hpp: for Quality::balanced
@@ -242,7 +242,7 @@ class MortonPipeline {
     backend_.stage(Stage::validate);
     const Count triangles{nullptr, triangle_count_};
     const ValidateTriangle validate{triangles_, may_split(options_) ? split_.boxes : work.boxes};
-    if (options_.references == References::automatic)
+    if (splits_if_uneven(options_.references))
       backend_.reduce_and_count(triangles, &state_->report, ValidateAndMeasure{validate},
                                 SizeClasses::count, split_.sizes);
     else
@@ -365,14 +365,16 @@ class MortonPipeline {
 
   void list_references(Workspace<Code>& work) {
     backend_.stage(Stage::references);
-    if (options_.references != References::all && !splits()) {
+    if (strict()) {
+      list_everywhere(work);
+    } else if (!splits()) {
       backend_.for_each(one, ReferenceEachOnce{counts_});
       backend_.allocate_references(listed());
       backend_.for_each(listed(), CopyTo<std::uint32_t>{work.sort.values, backend_.references()});
       backend_.for_each(trunks(), CopyTo<std::uint32_t>{work.trunk_first, backend_.leaf_offsets()});
       backend_.for_each(
           one, CloseOffsets{&counts_->trunks, &counts_->references, backend_.leaf_offsets()});
-    } else if (splits()) {
+    } else {
       backend_.for_each(one, CloseTrunks{counts_, work.trunk_first});
       const TrunkOfFragments fragments{work.sort.values, work.trunk_first, split_.owners,
                                        options_.leaf_size};
@@ -383,8 +385,6 @@ class MortonPipeline {
                         ListOwners{fragments, backend_.leaf_offsets(), backend_.references()});
       backend_.for_each(
           one, CloseOffsets{&counts_->trunks, &counts_->references, backend_.leaf_offsets()});
-    } else {
-      list_everywhere(work);
     }
   }
 
@@ -400,8 +400,9 @@ class MortonPipeline {
     auto* trunk_of = reinterpret_cast<std::uint32_t*>(work.sort.other_keys);
     const CellWalk walk{triangles_,
                         work.sort.values,
+                        splits() ? split_.owners : nullptr,
                         trunk_of,
-                        work.boxes,
+                        split_.boxes,
                         skeleton_.nodes,
                         work.levels,
                         work.parents_of_nodes,
@@ -411,14 +412,13 @@ class MortonPipeline {
     ReferenceAll<Backend>{walk,    work.trunk_first, listed(),
                           counts_, trunk_of,         work.sort.other_values}
         .run(backend_, triangles_, tree);
-    SplitCrowdedLeaves<Backend>{
-        walk,
-        work.trunk_keys,
-        options_.leaf_size,
-        options_.axis_order,
-        counts_,
-        &state_->root,
-        most_reference_trunks(backend_.reference_capacity(), triangle_count_)}
+    SplitCrowdedLeaves<Backend>{walk,
+                                work.trunk_keys,
+                                options_.leaf_size,
+                                options_.axis_order,
+                                counts_,
+                                &state_->root,
+                                most_reference_trunks(backend_.reference_capacity(), most_)}
         .run(backend_, triangles_, tree);
     backend_.allocate_tree(tree.leaves);
     backend_.for_each(tree.inner, FinishNode{tree.nodes, backend_.nodes()});
@@ -428,8 +428,7 @@ class MortonPipeline {
     backend_.for_each(
         one, CloseOffsets{&counts_->trunks, &counts_->references, backend_.leaf_offsets()});
     backend_.allocate_references(tree.references);
-    backend_.for_each(tree.references,
-                      GatherTo<std::uint32_t>{tree.ids, tree.numbers, backend_.references()});
+    backend_.for_each(tree.references, GatherIds{tree.listed, tree.numbers, backend_.references()});
     strict_tree_ = tree;
   }
 
@@ -438,17 +437,22 @@ class MortonPipeline {
     if (strict()) {
       const StrictTree& tree = strict_tree_;
       backend_.for_each(tree.inner, Fill{tree.arrivals, 0});
-      backend_.climb(tree.leaves, tree.arrivals,
-                     TightBoxes{work.boxes, tree.offsets, nullptr, tree.parents_of_nodes,
-                                tree.parents_of_leaves, &state_->frame, tree.inside, tree.numbers,
-                                backend_.nodes()});
+      backend_.climb(
+          tree.leaves, tree.arrivals,
+          TightBoxes{nullptr, tree.offsets, nullptr, tree.parents_of_nodes, tree.parents_of_leaves,
+                     &state_->frame, tree.listed, tree.numbers, backend_.nodes()});
     } else {
       backend_.for_each(nodes(), Fill{work.arrivals, 0});
-      backend_.climb(
-          trunks(), work.arrivals,
-          TightBoxes{work.boxes, splits() ? work.trunk_first : backend_.leaf_offsets(),
-                     splits() ? work.sort.values : backend_.references(), work.parents_of_nodes,
-                     work.parents_of_leaves, &state_->frame, nullptr, nullptr, backend_.nodes()});
+      backend_.climb(trunks(), work.arrivals,
+                     TightBoxes{work.boxes,
+                                splits() ? work.trunk_first : backend_.leaf_offsets(),
+                                splits() ? work.sort.values : backend_.references(),
+                                work.parents_of_nodes,
+                                work.parents_of_leaves,
+                                &state_->frame,
+                                {},
+                                nullptr,
+                                backend_.nodes()});
     }
     backend_.for_each(one, WriteHeader{state_, backend_.header()});
   }

@@ -14,6 +14,7 @@
 #include "core/compress.hpp"
 #include "core/frame.hpp"
 #include "core/key.hpp"
+#include "core/listed_parts.hpp"
 #include "core/morton.hpp"
 #include "core/polygon.hpp"
 #include "core/rounding.hpp"
@@ -44,16 +45,18 @@ struct SplitNode {
 
 /// Walks the cells of a tree whose planes and links are finished, and calls visit(leaf, box) for
 /// every leaf cell that the i-th sorted triangle touches, in the order of the leaves, with the box
-/// of what of it lies there.
+/// of what of it lies there. Where fragments of triangles were sorted, the first of a triangle's
+/// walks for the whole of it.
 ///
 /// The walk begins at the lowest node whose cell holds the triangle's whole box: up from its own
 /// trunk to the first level that has a plane across the box. Of cells only the part inside that box
 /// matters, so none has to be known from above.
 struct CellWalk {
   TriangleView triangles;
-  const std::uint32_t* ids;
+  const std::uint32_t* ids;     ///< of triangles or fragments
+  const std::uint32_t* owners;  ///< triangle of each fragment; null: ids are those of triangles
   const std::uint32_t* trunk_of;
-  const Box* boxes;
+  const Box* boxes;  ///< of triangles
   const SplitNode* nodes;
   const std::uint8_t* levels;
   const Parent* parents_of_nodes;
@@ -65,7 +68,7 @@ struct CellWalk {
   [[nodiscard]] ZKD_HOST_DEVICE Link start(std::uint32_t i) const {
     std::uint32_t across = 0;
     if (coder != nullptr) {
-      across = coder->first_level_across(boxes[ids[i]]);
+      across = coder->first_level_across(boxes[id(i)]);
       if (across == coder->code_bits) across = first_fine_level;
     }
     Link link = Link::leaf(trunk_of[i]);
@@ -89,16 +92,42 @@ struct CellWalk {
     float hi[3];
   };
 
-  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t id(std::uint32_t i) const { return ids[i]; }
+  [[nodiscard]] ZKD_HOST_DEVICE std::uint32_t id(std::uint32_t i) const {
+    return owners != nullptr ? owners[ids[i]] : ids[i];
+  }
+
+  /// Fragments of a triangle follow one another.
+  [[nodiscard]] ZKD_HOST_DEVICE bool is_first(std::uint32_t i) const {
+    return owners == nullptr || ids[i] == 0 || owners[ids[i] - 1] != owners[ids[i]];
+  }
+
+  /// Announces walks that will follow that for i: triangles lie in the order of the input.
+  [[gnu::always_inline]] void prefetch(std::uint32_t i, std::uint32_t end) const {
+    constexpr std::uint32_t boxes_ahead = 16;
+    constexpr std::uint32_t corners_ahead = 8;
+    if (i + boxes_ahead < end) {
+      const std::uint32_t triangle = id(i + boxes_ahead);
+      __builtin_prefetch(boxes + triangle);
+      if (triangles.indices != nullptr)
+        __builtin_prefetch(triangles.indices + std::size_t{3} * triangle);
+    }
+    if (i + corners_ahead < end) {
+      const std::uint32_t triangle = id(i + corners_ahead);
+      for (int corner = 0; corner < 3; ++corner)
+        __builtin_prefetch(triangles.position(triangles.index(triangle, corner)));
+    }
+  }
 
   template <class Visit>
   ZKD_HOST_DEVICE void operator()(std::uint32_t i, Visit& visit) const {
+    if (!is_first(i)) return;
+    const std::uint32_t triangle = id(i);
     const Link from = start(i);
-    const Box box = place(ids[i]);
+    const Box box = place(triangle);
     if (from.is_leaf())
       visit(from.index(), box);
     else
-      below(ids[i], from, box, box, visit);
+      below(triangle, from, box, box, visit);
   }
 
   /// The leaves below `link` that what lies in `cell` of triangle `id` touches; `whole` is the
@@ -225,6 +254,10 @@ struct CountReferences {
       ++count;
     }
   };
+  [[gnu::always_inline]] void prefetch(std::uint32_t i, std::uint32_t end) const requires requires {
+    walk.prefetch(i, end);
+  }
+  { walk.prefetch(i, end); }
   ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t i) {
     if (i != last + 1) next = std::uint64_t{i} * remembered;
     last = i;
@@ -278,15 +311,6 @@ struct WriteReferences {
   }
 };
 
-/// to[i] = from[numbers[i]]
-template <class T>
-struct GatherTo {
-  const T* from;
-  const std::uint32_t* numbers;
-  T* to;
-  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const { to[i] = from[numbers[i]]; }
-};
-
 /// The offsets of the leaves from that of the reference before, sorted by leaf, to that of the
 /// r-th: most begin where their first reference is, and empty ones with them.
 struct LeafOffsets {
@@ -338,14 +362,12 @@ struct StrictTree {
   const Parent* parents_of_leaves;
   std::uint32_t* arrivals;
 
-  // Made by FindReferences. In the order of the leaves:
+  // In the order of the leaves:
   Count references;
   const std::uint32_t* offsets;  ///< of leaves, and the end
   const std::uint32_t* leaf_of;
   std::uint32_t* numbers;
-  // By number:
-  const std::uint32_t* ids;  ///< of triangles
-  const Box* inside;         ///< what lies in the leaf's cell, in tree space
+  ListedParts listed;  ///< by number
 };
 
 /// References noted while counting.
@@ -359,36 +381,41 @@ struct NotesWorkspace {
   }
 };
 
-/// Counts references, takes `arrays` for them (leaves by leaves, room for one more offset), and
-/// writes them down.
+/// Which leaves list what is walked for: first how often, then, once there is room, which ones.
 template <class Walk, class Backend>
 struct FindReferences {
   Walk walk;
   Count walks;
-  std::uint32_t remembered;   ///< leaves of one walk
-  BuildCounts* counts;        ///< `references_needed` is made
-  std::uint32_t* references;  ///< and this, in it
-  std::uint32_t* offsets;     ///< made: of each walk's references
+  std::uint32_t remembered;  ///< leaves of one walk
+  std::uint32_t* offsets;    ///< made: of each walk's references
+  NotesWorkspace noted{};
 
-  /// Returns how many there are.
-  template <class Workspace>
-  Count run(Backend& backend, const TriangleView& view, Count leaves, Workspace& work) {
-    NotesWorkspace noted{};
+  /// Makes `total`.
+  void count(Backend& backend, std::uint64_t* total) {
     backend.take(noted, backend.size(walks), std::size_t{remembered});
     backend.exclusive_scan(walks,
                            CountReferences<Walk>{walk, noted.notes, noted.noted_at, remembered},
-                           offsets, &counts->references_needed);
-    const std::uint64_t capacity = backend.reference_capacity();
-    backend.for_each(one, AdmitReferences{counts, references, capacity});
-    backend.raise(&counts->status, view);
-    Count found{references, static_cast<std::uint32_t>(capacity)};
-    found.bound = backend.size(found);
-    backend.take(work, found.bound, backend.size(leaves));
+                           offsets, total);
+  }
+
+  /// `found`: that total, in the backend's memory.
+  void write(Backend& backend, const std::uint32_t* found, const FoundReferences& to) const {
     backend.for_each(walks, WriteReferences<Walk>{walk, noted.notes, noted.noted_at, offsets,
-                                                  walks.actual, references, work.found()});
-    return found;
+                                                  walks.actual, found, to});
   }
 };
+
+/// Looks whether there is room for `counts->references_needed`, makes `references`, and returns it.
+template <class Backend>
+Count admit_references(Backend& backend, BuildCounts* counts, std::uint32_t* references,
+                       const TriangleView& triangles) {
+  const std::uint64_t capacity = backend.reference_capacity();
+  backend.for_each(one, AdmitReferences{counts, references, capacity});
+  backend.raise(&counts->status, triangles);
+  Count admitted{references, static_cast<std::uint32_t>(capacity)};
+  admitted.bound = backend.size(admitted);
+  return admitted;
+}
 
 /// References of triangles, and room to sort them by leaf.
 struct ReferenceWorkspace {
@@ -404,7 +431,6 @@ struct ReferenceWorkspace {
     inside = arena.take<Box>(references);
     offsets = arena.take<std::uint32_t>(leaves + 1);
   }
-  [[nodiscard]] FoundReferences found() const { return {sort.keys, ids, inside}; }
 };
 
 /// Leaves of a triangle that are remembered.
@@ -423,11 +449,12 @@ struct ReferenceAll {
   void run(Backend& backend, const TriangleView& view, StrictTree& tree) {
     backend.for_each(tree.leaves,
                      LabelTrunk{trunk_first, tree.leaves.actual, triangles.actual, trunk_of});
+    FindReferences<CellWalk, Backend> find{walk, triangles, remembered_of_triangle, offsets};
+    find.count(backend, &counts->references_needed);
+    tree.references = admit_references(backend, counts, &counts->first_references, view);
     ReferenceWorkspace work{};
-    tree.references =
-        FindReferences<CellWalk, Backend>{
-            walk, triangles, remembered_of_triangle, counts, &counts->first_references, offsets}
-            .run(backend, view, tree.leaves, work);
+    backend.take(work, tree.references.bound, backend.size(tree.leaves));
+    find.write(backend, tree.references.actual, {work.sort.keys, work.ids, work.inside});
     backend.for_each(tree.references, Number{work.sort.values});
     work.sort =
         backend.radix_sort(work.sort, tree.references, bits_to_count(backend.size(tree.leaves)));
@@ -437,8 +464,7 @@ struct ReferenceAll {
     tree.offsets = work.offsets;
     tree.leaf_of = work.sort.keys;
     tree.numbers = work.sort.values;
-    tree.ids = work.ids;
-    tree.inside = work.inside;
+    tree.listed = {work.ids, work.inside, nullptr, nullptr};
   }
 };
 

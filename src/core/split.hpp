@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Between validation and encoding, for References::budget: triangles whose boxes hold much besides
-// them are cut on planes of the lattice, and fragments take their place in all later stages (Ernst,
+// Between validation and encoding, for References::budget, and for `automatic` and `all` in uneven
+// scenes: triangles whose boxes hold much besides them are cut on planes of the lattice, and
+// fragments take their place in all later stages (Ernst,
 // Greiner: Early Split Clipping for Bounding Volume Hierarchies, RT 2007; Karras, Aila: Fast
 // Parallel Construction of High-Quality Bounding Volume Hierarchies, HPG 2013, section 4).
 //
@@ -335,6 +336,11 @@ struct SplitTriangle {
   }
 
  private:
+  static ZKD_HOST_DEVICE bool same(const Box& x, const Box& y) {
+    bool equal = true;
+    for (int a = 0; a < 3; ++a) equal = equal && x.lo[a] == y.lo[a] && x.hi[a] == y.hi[a];
+    return equal;
+  }
   static ZKD_HOST_DEVICE double longest_side(const Box& box) {
     double longest = 0.0;
     for (int a = 0; a < 3; ++a)
@@ -353,7 +359,8 @@ struct SplitTriangle {
         const Halves halves(corners, piece.box, plane, slack);
         if (halves.side[0].empty() || halves.side[1].empty()) {
           const Box& rest = halves.side[halves.side[0].empty() ? 1 : 0];
-          if (rest.empty()) break;
+          if (rest.empty() || same(rest, piece.box))
+            break;  // the same: no plane of a lattice over it
           piece.box = rest;
           continue;
         }
@@ -449,7 +456,7 @@ struct CloseTrunks {
   ZKD_HOST_DEVICE void operator()(std::uint32_t) const { first[counts->trunks] = counts->listed; }
 };
 
-/// For References::budget and ::automatic.
+/// For all references but `once`.
 struct SplitWorkspace {
   SplitState* state;
   std::uint32_t* sizes;   ///< triangles in each of SizeClasses

@@ -40,21 +40,22 @@ struct BuildCounts {
   std::uint32_t trunks = 0;
   std::uint32_t nodes = 0;
   std::uint32_t references = 0;
-  std::uint32_t fragments = 0;         ///< of References::budget, places that stay empty included
+  std::uint32_t fragments = 0;         ///< places that stay empty included
   std::uint32_t splits = 0;            ///< 1: triangles are split
   std::uint32_t first_trunks = 0;      ///< `all`: before crowded leaves are split
   std::uint32_t first_references = 0;  ///< likewise
   std::uint32_t crowded_leaves = 0;
   std::uint32_t crowded_references = 0;  ///< in them
   std::uint32_t reference_trunks = 0;    ///< leaves after that
-  std::uint32_t unused = 0;              ///< no padding: see BuildState
+  std::uint32_t found_again = 0;         ///< references in those that crowded leaves became
   std::uint64_t references_needed = 0;
+  std::uint64_t found_again_needed = 0;
 
   ZKD_HOST_DEVICE void fail(ErrorCode code, std::uint64_t offender, std::uint64_t first = 0,
                             std::uint64_t second = 0) {
     status = {1, code, offender, {first, second}};
     given = listed = left_out = trunks = nodes = references = fragments = first_references = 0;
-    first_trunks = crowded_leaves = crowded_references = reference_trunks = 0;
+    first_trunks = crowded_leaves = crowded_references = reference_trunks = found_again = 0;
   }
 };
 
@@ -87,6 +88,21 @@ struct AdmitReferences {
       counts->fail(ErrorCode::reference_capacity, needed, capacity);
     else
       *references = static_cast<std::uint32_t>(needed);
+  }
+};
+
+/// The same for what is found below crowded leaves, before all are counted: stops the build only
+/// where no tree can hold those alone. All are these and those of the other leaves.
+struct AdmitFoundAgain {
+  BuildCounts* counts;
+
+  ZKD_HOST_DEVICE void operator()(std::uint32_t) const {
+    if (counts->found_again_needed > max_count)
+      counts->fail(
+          ErrorCode::too_many_references,
+          counts->found_again_needed + (counts->first_references - counts->crowded_references));
+    else
+      counts->found_again = static_cast<std::uint32_t>(counts->found_again_needed);
   }
 };
 

@@ -10,6 +10,9 @@
 
 namespace zkd::core {
 
+/// Of a trunk, at most.
+inline constexpr std::uint32_t most_leaf_size = 1024;
+
 /// Whether a trunk begins with triangle i.
 ///
 /// Neighbours i - 1 and i part at some node of the conceptual tree. A trunk begins at i exactly

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// For References::automatic: whether splitting triangles pays, told from the sizes of their boxes
-// while they are validated.
+// For References::automatic and ::all: whether splitting triangles pays, told from the sizes of
+// their boxes while they are validated.
 //
 // A triangle listed once hangs below the node where its centre falls, as deep as triangles are
 // dense there, and its box makes all nodes on the way large. Were N triangles of equal boxes spread
 // evenly, the node of a box of p of the scene's surface would lie log2(p N) levels higher than a
 // leaf: a random line that meets the box visits about so many nodes that it would not need. Summed
 // over all triangles for which these are more than `few_levels`, that is the unevenness of a scene:
-// 0 to 12 for scans and the Fairy's meadow, 48 for Sibenik, where splitting still saves nothing,
-// 105 for the Conference room and 139 for Sponza, where it saves a third of the visits.
+// 0 for scans, 7 for the Fairy's meadow, 44 for Sibenik, where splitting saves `budget` nothing,
+// 110 for the Conference room and 160 for Sponza, where it saves a third of the visits.
 //
 // Triangles of fewer levels are most of a scan and do not tell scenes apart; leaving them out is
 // what makes the measure cheap.
@@ -19,6 +19,7 @@
 #include <cstdint>
 
 #include <zkd/geometry.hpp>
+#include <zkd/options.hpp>
 #include <zkd/traversal/arithmetic.hpp>
 
 #include "core/area.hpp"
@@ -46,7 +47,7 @@ inline constexpr int few_levels = 5;
 struct ValidateAndMeasure {
   ValidateTriangle validate;
   /// A side that is too short, by the part of the scene seen so far: which ones are left out
-  /// depends on the order, but none that is_uneven() counts.
+  /// depends on the order, but none that unevenness_of() counts.
   float too_short = 0.0F;
   std::uint32_t measured = 0;
 
@@ -72,15 +73,28 @@ struct ValidateAndMeasure {
   }
 };
 
-/// From how much on triangles are split: Sibenik, where it does not pay, has 48, Conference 105.
-inline constexpr double uneven = 75.0;
+/// Whether the scene decides if triangles are split.
+ZKD_HOST_DEVICE inline bool splits_if_uneven(References references) {
+  return references == References::automatic || references == References::all;
+}
 
-/// Whether a scene of `valid` triangles within `bounds`, so many in each class, is uneven.
-ZKD_HOST_DEVICE inline bool is_uneven(const std::uint32_t* classes, const Box& bounds,
-                                      std::uint32_t valid) {
-  if (valid == 0) return false;
+/// Whether a scene of so much unevenness has its triangles split, where it decides. A triangle that
+/// is listed once is split for its box alone, which pays in Conference, not in Sibenik. Cells are
+/// better that are made of fragments wherever large triangles lie among small ones: SAH cost 54 to
+/// 89 of 100 in Conference, the Fairy's meadow, Sponza and Sibenik, with leaves of one size. But
+/// where lines meet dozens of boxes that lie in each other (a million about one point), more cells
+/// list them all more often.
+ZKD_HOST_DEVICE inline bool is_uneven(References references, double unevenness) {
+  return references == References::all ? unevenness > 3.0 && unevenness < 1000.0
+                                       : unevenness > 75.0;
+}
+
+/// Unevenness of a scene of `valid` triangles within `bounds`, so many in each class.
+ZKD_HOST_DEVICE inline double unevenness_of(const std::uint32_t* classes, const Box& bounds,
+                                            std::uint32_t valid) {
+  if (valid == 0) return 0.0;
   const double even = half_area(bounds) / static_cast<double>(valid);
-  if (!(even > 0.0)) return false;
+  if (!(even > 0.0)) return 0.0;
   // log2, with straight lines between powers of two: the same bits everywhere.
   const int exponent = exponent_of(even);
   const double log_even = exponent + (even * power_of_two(-exponent) - 1.0);
@@ -94,7 +108,7 @@ ZKD_HOST_DEVICE inline bool is_uneven(const std::uint32_t* classes, const Box& b
     const double size = 1.4142135623730951 * power_of_two(log_size);
     sum += static_cast<double>(classes[c]) * (size / half_area(bounds)) * levels;
   }
-  return sum > uneven;
+  return sum;
 }
 
 }  // namespace zkd::core

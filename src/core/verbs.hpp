@@ -15,7 +15,8 @@
 //                                      most_bins)
 //   reduce_and_count(count, &out, f, bins, counts)     both at once: f(i, out) names the bin
 //   select(count, f, out, &total)      the i for which f(i), in order
-//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1)
+//   exclusive_scan(count, f, out, &total)     sums of f(0) .. f(i - 1). f.prefetch(i, end), if
+//                                      there is one, may be called before, below `end`
 //   scan<T>(count, f)                  sum = T{}; for each i in order: f(i, sum), then f.take(i,
 //   sum),
 //                                      in any grouping (T::combine, of what follows). f.take(i) may

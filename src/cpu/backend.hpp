@@ -152,6 +152,7 @@ class Backend {
       Functor g = loaded(f);
       std::uint64_t sum = 0;
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
+        if constexpr (requires { g.prefetch(i, range.end); }) g.prefetch(i, range.end);
         const std::uint32_t value = g(i);
         out[i] = static_cast<std::uint32_t>(sum);
         sum += value;
@@ -393,6 +394,7 @@ class Backend {
           core::bytes_of(core::ReferenceTrunkWorkspace{}, references, triangles) +
           core::bytes_of(core::SubtreeWorkspace{}, leaves) +
           core::bytes_of(core::NotesWorkspace{}, references, core::remembered_of_reference) +
+          core::bytes_of(core::FoundAgainWorkspace{}, references) +
           core::bytes_of(core::SplitReferenceWorkspace{}, references, leaves);
     }
     // Of what single verbs take for themselves, a sort by 64 bits takes most.
@@ -546,7 +548,7 @@ class Backend {
     }
   }
 
-  static constexpr int max_blocks = 32;  // a build takes eleven at most, a stage twenty-five
+  static constexpr int max_blocks = 32;  // a build takes fifteen at most, a stage twenty-five
 
   FloatEnvironment environment_;  // for the serial steps between passes
   Threads threads_;

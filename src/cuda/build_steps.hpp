@@ -58,12 +58,10 @@ struct TreeAccess {
 };
 
 inline Capacity capacity_for(std::uint64_t triangles, const BuildOptions& options) {
-  if (options.references != References::all) {
-    const std::uint64_t most = core::most_elements(options, static_cast<std::uint32_t>(triangles));
-    return {most, most};
-  }
+  const std::uint64_t most = core::most_elements(options, static_cast<std::uint32_t>(triangles));
+  if (options.references != References::all) return {most, most};
   const std::uint64_t references = options.reference_capacity;
-  return {references, core::most_reference_trunks(references, triangles)};
+  return {references, core::most_reference_trunks(references, most)};
 }
 
 /// What the passes left in the tree's block.

@@ -80,7 +80,8 @@ inline core::BuildState state_of(const zkd::Tree& tree) {
   counts.given = static_cast<std::uint32_t>(statistics.triangles);
   counts.listed = state.report.valid;
   counts.left_out = counts.given - counts.listed;
-  counts.splits = tree.options().references == References::budget ? 1 : 0;
+  const bool may_be_split = tree.options().references != References::once;
+  counts.splits = may_be_split && !statistics.skip(Skip::splitting).taken ? 1 : 0;
   counts.crowded_trunks = static_cast<std::uint32_t>(statistics.crowded_trunks);
   counts.crowded_triangles = static_cast<std::uint32_t>(statistics.crowded_triangles);
   counts.crowded_leaves = static_cast<std::uint32_t>(statistics.crowded_leaves);

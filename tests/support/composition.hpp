@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <zkd/geometry.hpp>
@@ -23,6 +24,7 @@ namespace zkd::test {
 struct Composition {
   Box bounds;
   Lattice lattice;
+  bool split = false;  ///< triangles, into fragments
   std::uint32_t crowded = 0;
   std::vector<std::uint32_t> first;  ///< of each trunk
   Link root;
@@ -51,23 +53,37 @@ inline Composition compose(const Executor& executor, const TriangleView& triangl
       stages::triangle_boxes(executor, uploaded, options.invalid_triangles, boxes);
   out.bounds = scene.bounds;
   std::uint32_t leaf_size = options.leaf_size;
-  if (leaf_size == 0) leaf_size = options.references == References::all ? 8 : 4;
+  if (leaf_size == 0) leaf_size = options.references == References::all ? 12 : 4;
   std::uint32_t width = options.code_bits;
   if (width == 0) width = scene.valid < (1u << 22) ? 32 : 64;
   out.lattice = stages::make_lattice(scene.bounds, width, options.axis_order);
 
-  Array<std::uint64_t> codes(scene.valid);
-  Array<std::uint32_t> ids(scene.valid);
-  stages::morton_encode(executor, boxes, out.lattice, codes, ids);
+  // What is coded: triangles, or fragments.
+  out.split = stages::pays_to_split(executor, boxes, options.references);
+  const auto cut = [&](std::span<Box> to, std::span<std::uint32_t> owners) {
+    return stages::split_triangles(executor, uploaded, boxes, out.lattice, options.budget, to,
+                                   owners);
+  };
+  const stages::Fragments fragments =
+      out.split ? cut({}, {}) : stages::Fragments{scene.valid, scene.valid};
+  Array<Box> fragment_boxes(out.split ? fragments.places : 0);
+  Array<std::uint32_t> owners(out.split ? fragments.places : 0);
+  if (out.split) (void)cut(fragment_boxes, owners);
+  const Array<Box>& coded = out.split ? fragment_boxes : boxes;
+  const std::size_t n = fragments.count;
+
+  Array<std::uint64_t> codes(n);
+  Array<std::uint32_t> ids(n);
+  stages::morton_encode(executor, coded, out.lattice, codes, ids);
   (void)stages::radix_sort(executor, codes, ids, 64);
 
-  Array<stages::TrunkKey> keys(scene.valid);
-  Array<std::uint32_t> crowd(scene.valid);
-  Array<Lattice> lattices(scene.valid);
+  Array<stages::TrunkKey> keys(n);
+  Array<std::uint32_t> crowd(n);
+  Array<Lattice> lattices(n);
   out.crowded =
-      stages::recode_crowded(executor, boxes, out.lattice, codes, ids, leaf_size,
+      stages::recode_crowded(executor, coded, out.lattice, codes, ids, leaf_size,
                              options.axis_order, options.recode_crowded, keys, crowd, lattices);
-  Array<std::uint32_t> found(scene.valid);
+  Array<std::uint32_t> found(n);
   const std::uint32_t trunks = stages::find_trunks(executor, keys, leaf_size, found);
   out.first = found.download();
   out.first.resize(trunks);
@@ -88,18 +104,25 @@ inline Composition compose(const Executor& executor, const TriangleView& triangl
   out.planes = planes.download();
 
   const Array<std::uint32_t> first = upload(out.first);
-  const stages::Skeleton skeleton{ids, first, levels, children, out.root, axes, planes};
+  const stages::Skeleton skeleton{ids, first, levels, children, out.root, axes, planes, owners};
   Array<std::uint32_t> leaf_offsets(trunks + std::size_t{1});
   Array<std::uint32_t> none(0);
-  const std::uint64_t needed = stages::list_references(
-      executor, uploaded, boxes, skeleton, out.lattice, options.references, leaf_offsets, none);
+  const References policy =
+      options.references == References::all ? References::all : References::once;
+  const std::uint64_t needed = stages::list_references(executor, uploaded, boxes, skeleton,
+                                                       out.lattice, policy, leaf_offsets, none);
   Array<std::uint32_t> references(needed);
-  Array<Box> inside(options.references == References::all ? needed : 0);
-  (void)stages::list_references(executor, uploaded, boxes, skeleton, out.lattice,
-                                options.references, leaf_offsets, references, inside);
-  if (options.references == References::once) {
+  Array<Box> inside(policy == References::all ? needed : 0);
+  (void)stages::list_references(executor, uploaded, boxes, skeleton, out.lattice, policy,
+                                leaf_offsets, references, inside);
+  if (policy == References::once) {
     Array<Node> nodes(node_count);
-    stages::tight_boxes(executor, boxes, skeleton, leaf_offsets, references, nodes);
+    std::vector<std::uint32_t> ends = out.first;
+    ends.push_back(static_cast<std::uint32_t>(n));
+    if (out.split)
+      stages::tight_boxes(executor, coded, skeleton, upload(ends), ids, nodes);
+    else
+      stages::tight_boxes(executor, boxes, skeleton, leaf_offsets, references, nodes);
     out.leaf_offsets = leaf_offsets.download();
     out.references = references.download();
     out.nodes = nodes.download();

@@ -61,10 +61,16 @@ void tight_boxes(const Executor& executor, std::span<const Box> boxes, const Ske
   const core::MadeTree made = core::make_tree(backend, boxes, skeleton, nodes.data());
   auto* arrivals = backend.template take_array<std::uint32_t>(made.inner.bound);
   backend.for_each(made.inner, core::Fill{arrivals, 0});
-  backend.climb(
-      made.leaves, arrivals,
-      core::TightBoxes{boxes.data(), leaf_offsets.data(), references.data(), made.parents_of_nodes,
-                       made.parents_of_leaves, made.frame, nullptr, nullptr, nodes.data()});
+  backend.climb(made.leaves, arrivals,
+                core::TightBoxes{boxes.data(),
+                                 leaf_offsets.data(),
+                                 references.data(),
+                                 made.parents_of_nodes,
+                                 made.parents_of_leaves,
+                                 made.frame,
+                                 {},
+                                 nullptr,
+                                 nodes.data()});
   backend.wait();
 }
 
@@ -91,8 +97,15 @@ void tight_boxes(const Executor& executor, Link root, std::span<const std::uint3
   backend.for_each(inner, core::FindParents{nodes.data(), parents_of_nodes, parents_of_leaves});
   backend.for_each(inner, core::Fill{arrivals, 0});
   backend.climb(leaves, arrivals,
-                core::TightBoxes{nullptr, leaf_offsets.data(), nullptr, parents_of_nodes,
-                                 parents_of_leaves, nullptr, inside.data(), nullptr, nodes.data()});
+                core::TightBoxes{nullptr,
+                                 leaf_offsets.data(),
+                                 nullptr,
+                                 parents_of_nodes,
+                                 parents_of_leaves,
+                                 nullptr,
+                                 {nullptr, inside.data(), nullptr, nullptr},
+                                 nullptr,
+                                 nodes.data()});
   backend.wait();
 }
 

@@ -56,10 +56,15 @@ inline void check_leaf_size(std::uint32_t leaf_size) {
   check_options(options);
 }
 
-inline void check_references(References references) {
+inline void check_policy(References references) {
   BuildOptions options;
   options.references = references;
   check_options(options);
+}
+
+/// For the stage that lists them.
+inline void check_references(References references) {
+  check_policy(references);
   if (references != References::once && references != References::all)
     throw Error(ErrorCode::unsupported_option, 0,
                 std::string("a stage by itself lists references once or all, not ") +

@@ -17,6 +17,7 @@
 #include "core/stages/recode.hpp"      // IWYU pragma: export
 #include "core/stages/references.hpp"  // IWYU pragma: export
 #include "core/stages/sort.hpp"        // IWYU pragma: export
+#include "core/stages/split.hpp"       // IWYU pragma: export
 #include "core/stages/trunks.hpp"      // IWYU pragma: export
 #include "core/stages/validate.hpp"    // IWYU pragma: export
 
@@ -25,6 +26,10 @@
   namespace zkd::stages {                                                                       \
   template ZKD_API SceneSummary triangle_boxes(const Executor&, const TriangleView&,            \
                                                InvalidTriangles, std::span<Box>);               \
+  template ZKD_API bool pays_to_split(const Executor&, std::span<const Box>, References);       \
+  template ZKD_API Fragments split_triangles(const Executor&, const TriangleView&,              \
+                                             std::span<const Box>, const Lattice&, float,       \
+                                             std::span<Box>, std::span<std::uint32_t>);         \
   template ZKD_API void morton_encode(const Executor&, std::span<const Box>, const Lattice&,    \
                                       std::span<std::uint32_t>, std::span<std::uint32_t>);      \
   template ZKD_API void morton_encode(const Executor&, std::span<const Box>, const Lattice&,    \

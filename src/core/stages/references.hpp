@@ -14,11 +14,24 @@
 #include "core/crowded_leaves.hpp"
 #include "core/morton.hpp"
 #include "core/references.hpp"
+#include "core/split.hpp"
 #include "core/stages/backend.hpp"
 #include "core/stages/input.hpp"
 #include "core/stages/skeleton.hpp"
 #include "core/status.hpp"
 #include "core/verbs.hpp"
+
+namespace zkd::core {
+
+/// to[i]: the box of reference i
+struct GatherBoxes {
+  ListedParts listed;
+  const std::uint32_t* numbers;
+  Box* to;
+  ZKD_HOST_DEVICE void operator()(std::uint32_t i) const { to[i] = listed.box(numbers[i]); }
+};
+
+}  // namespace zkd::core
 
 namespace zkd::stages {
 
@@ -43,20 +56,24 @@ std::uint64_t list_references(const Executor& executor, const TriangleView& tria
   known.listed = valid.bound;
   known.trunks = trunks.bound;
   known.nodes = made.inner.bound;
-  known.references = valid.bound;  // of `once`; `all` counts them
-  known.references_needed = valid.bound;
   auto* counts = backend.keep(known);
 
+  const std::uint32_t* const owners = skeleton.owners.empty() ? nullptr : skeleton.owners.data();
+  core::check_each(backend, core::exactly(skeleton.owners.size()), "owners",
+                   core::IsNotBelow{owners, triangles.triangle_count});
   const std::uint32_t* offsets_found = skeleton.first.data();
+  const std::uint32_t* listed = skeleton.ids.data();
+  std::uint64_t needed = valid.bound;
   core::StrictTree strict{};
   if (policy == References::all) {
-    core::StrictTree tree = core::strict_tree_of(backend, made, backend.nodes(), counts);
+    strict = core::strict_tree_of(backend, made, backend.nodes(), counts);
     auto* trunk_of = backend.template take_array<std::uint32_t>(valid.bound);
     const core::CellWalk walk{triangles,
                               skeleton.ids.data(),
+                              owners,
                               trunk_of,
                               boxes.data(),
-                              tree.nodes,
+                              strict.nodes,
                               skeleton.levels.data(),
                               made.parents_of_nodes,
                               made.parents_of_leaves,
@@ -68,23 +85,33 @@ std::uint64_t list_references(const Executor& executor, const TriangleView& tria
                                 counts,
                                 trunk_of,
                                 backend.template take_array<std::uint32_t>(valid.bound)}
-        .run(backend, triangles, tree);
-    offsets_found = tree.offsets;
-    strict = tree;
+        .run(backend, triangles, strict);
+    offsets_found = strict.offsets;
+    needed = backend.read(&counts->references_needed);
+  } else if (owners != nullptr) {
+    auto* first = backend.template take_array<std::uint32_t>(std::size_t{trunks.bound} + 1);
+    backend.for_each(trunks, core::CopyTo<std::uint32_t>{skeleton.first.data(), first});
+    backend.for_each(core::one, core::CloseTrunks{counts, first});
+    const core::TrunkOfFragments fragments{skeleton.ids.data(), first, owners,
+                                           core::most_leaf_size};
+    auto* offsets = backend.template take_array<std::uint32_t>(trunks.bound);
+    backend.exclusive_scan(trunks, core::CountOwners{fragments}, offsets, &counts->references);
+    needed = backend.read(&counts->references);
+    auto* triangles_found = backend.template take_array<std::uint32_t>(needed);
+    backend.for_each(trunks, core::ListOwners{fragments, offsets, triangles_found});
+    offsets_found = offsets;
+    listed = triangles_found;
   }
-  const std::uint64_t needed = backend.read(&counts->references_needed);
-  const std::size_t fit = std::min<std::size_t>(references.size(), needed);
+  const core::Count written = core::exactly(std::min<std::size_t>(references.size(), needed));
   backend.for_each(trunks, core::CopyTo<std::uint32_t>{offsets_found, leaf_offsets.data()});
   auto* const end = backend.keep(static_cast<std::uint32_t>(needed));
   backend.for_each(core::one, core::CloseOffsets{&counts->trunks, end, leaf_offsets.data()});
-  const core::Count written = core::exactly(fit);
   if (policy == References::all) {
-    backend.for_each(written,
-                     core::GatherTo<std::uint32_t>{strict.ids, strict.numbers, references.data()});
+    backend.for_each(written, core::GatherIds{strict.listed, strict.numbers, references.data()});
     backend.for_each(core::exactly(std::min<std::size_t>(inside.size(), needed)),
-                     core::GatherTo<Box>{strict.inside, strict.numbers, inside.data()});
+                     core::GatherBoxes{strict.listed, strict.numbers, inside.data()});
   } else {
-    backend.for_each(written, core::CopyTo<std::uint32_t>{skeleton.ids.data(), references.data()});
+    backend.for_each(written, core::CopyTo<std::uint32_t>{listed, references.data()});
   }
   backend.wait();
   return needed;
@@ -129,8 +156,7 @@ SplitLeaves split_crowded_leaves(const Executor& executor, const TriangleView& t
   tree.leaf_of = leaf_of;
   tree.numbers = backend.template take_array<std::uint32_t>(listed.bound);
   backend.for_each(listed, core::Number{tree.numbers});
-  tree.ids = references.data();
-  tree.inside = inside.data();
+  tree.listed = {references.data(), inside.data(), nullptr, nullptr};
   core::CellWalk walk{};
   walk.triangles = triangles;
   walk.boxes = boxes.data();
@@ -156,9 +182,9 @@ SplitLeaves split_crowded_leaves(const Executor& executor, const TriangleView& t
   backend.for_each(fitting(out.leaf_offsets.size(), std::uint64_t{leaf_count} + 1),
                    core::CopyTo<std::uint32_t>{tree.offsets, out.leaf_offsets.data()});
   backend.for_each(fitting(out.references.size(), reference_count),
-                   core::GatherTo<std::uint32_t>{tree.ids, tree.numbers, out.references.data()});
+                   core::GatherIds{tree.listed, tree.numbers, out.references.data()});
   backend.for_each(fitting(out.inside.size(), reference_count),
-                   core::GatherTo<Box>{tree.inside, tree.numbers, out.inside.data()});
+                   core::GatherBoxes{tree.listed, tree.numbers, out.inside.data()});
   const Link new_root = backend.read(root);
   return {new_root, leaf_count, reference_count};
 }

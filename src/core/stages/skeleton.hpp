@@ -111,8 +111,9 @@ void check_skeleton(Backend& backend, std::span<const Box> boxes, const Skeleton
   check_length(skeleton.planes.size(), inner.bound, "planes");
   if (!skeleton.root.is_none() && IsDangling{&skeleton.root, leaves.bound, inner.bound}(0))
     throw Error(ErrorCode::invalid_view, skeleton.root.index(), "root is out of range");
+  const bool fragments = !skeleton.owners.empty();
   check_each(backend, exactly(skeleton.ids.size()), "ids",
-             IsNotBelow{skeleton.ids.data(), boxes.size()});
+             IsNotBelow{skeleton.ids.data(), fragments ? skeleton.owners.size() : boxes.size()});
   check_each(backend, exactly(skeleton.children.size()), "children",
              IsDangling{skeleton.children.data(), leaves.bound, inner.bound});
   check_each(backend, inner, "axes", IsNotBelow{skeleton.axes.data(), 3});
