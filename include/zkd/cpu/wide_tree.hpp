@@ -67,9 +67,9 @@ struct WideTreeView {
 };
 
 /// Owns a wide tree. Of bytes() there are 320 for each block and 224 for each node. On the scenes of
-/// the benchmark there is a node for every five blocks, or ten in trees of References::all, and that
-/// is 60 to 75 bytes for each triangle where it is referenced once, and 130 to 240 for trees of
-/// References::all and Builder::sah.
+/// the benchmark there is a node for every five blocks, in trees of References::all for 11 to 16,
+/// and that is 60 to 75 bytes for each triangle where it is referenced once, and 110 to 240 for
+/// trees of References::all and Builder::sah.
 using WideTree = TreeForm<WideTreeView>;
 
 /// The wide form of `tree`, which was built from `triangles` (or a copy of its data at other
