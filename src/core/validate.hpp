@@ -85,11 +85,13 @@ struct ValidateTriangle {
   }
 };
 
-/// Boxes that are already made: only their union, for those who call a later stage by itself.
+/// Boxes that are already made: only their union, and how many are not empty, for those who call a
+/// later stage by itself.
 struct IncludeBox {
   const Box* boxes;
   ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {
     include(report.bounds, boxes[triangle]);
+    if (!boxes[triangle].empty()) ++report.valid;
   }
 };
 

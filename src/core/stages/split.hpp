@@ -22,15 +22,6 @@
 
 namespace zkd::core {
 
-/// Bounds, and how many boxes are not empty.
-struct IncludeAndCount {
-  const Box* boxes;
-  ZKD_HOST_DEVICE void operator()(std::uint32_t triangle, ValidationReport& report) const {
-    include(report.bounds, boxes[triangle]);
-    if (!boxes[triangle].empty()) ++report.valid;
-  }
-};
-
 struct ClassOfSize {
   const Box* boxes;
   ZKD_HOST_DEVICE std::uint32_t operator()(std::uint32_t triangle) const {
@@ -61,7 +52,7 @@ bool pays_to_split(const Executor& executor, std::span<const Box> boxes, Referen
   auto* scene = backend.keep(core::ValidationReport{});
   auto* unevenness = backend.keep(0.0);
   auto* classes = backend.template take_array<std::uint32_t>(core::SizeClasses::count);
-  backend.reduce(count, scene, core::IncludeAndCount{boxes.data()});
+  backend.reduce(count, scene, core::IncludeBox{boxes.data()});
   backend.histogram(count, core::ClassOfSize{boxes.data()}, core::SizeClasses::count, classes);
   backend.for_each(core::one, core::MeasureUnevenness{classes, scene, unevenness});
   return core::is_uneven(policy, backend.read(unevenness));
@@ -81,7 +72,7 @@ Fragments split_triangles(const Executor& executor, const TriangleView& triangle
   using Backend = core::ExactBackendOf<Executor>;
   Backend backend(executor);
   auto* scene = backend.keep(core::ValidationReport{});
-  backend.reduce(given, scene, core::IncludeAndCount{boxes.data()});
+  backend.reduce(given, scene, core::IncludeBox{boxes.data()});
   core::BuildCounts known;
   known.given = given.bound;
   known.listed = backend.read(scene).valid;
@@ -98,7 +89,7 @@ Fragments split_triangles(const Executor& executor, const TriangleView& triangle
       .run(backend);
   const core::Count places = core::exactly(backend.read(&counts->fragments));
   auto* result = backend.keep(core::ValidationReport{});
-  backend.reduce(places, result, core::IncludeAndCount{made});
+  backend.reduce(places, result, core::IncludeBox{made});
   const auto fitting = [&](std::size_t room) {
     return core::exactly(std::min<std::size_t>(room, places.bound));
   };
