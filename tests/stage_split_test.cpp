@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include <zkd/error.hpp>
@@ -14,29 +13,13 @@
 
 #include "scene/mesh.hpp"
 #include "support/caught.hpp"
+#include "support/meshes.hpp"
 #include "support/platform.hpp"
 
 namespace zkd {
 namespace {
 
-// `small` triangles of a twentieth of the unit cube, and `large` through all of it.
-scene::Mesh room(std::uint32_t small, std::uint32_t large) {
-  scene::Mesh mesh;
-  std::minstd_rand numbers(3);
-  const auto number = [&numbers] { return static_cast<float>(numbers() % 1024) / 1024.0F; };
-  const auto point = [&number] {
-    const float x = number();
-    const float y = number();
-    return glm::vec3(x, y, number());
-  };
-  for (std::uint32_t i = 0; i < small + large; ++i) {
-    const glm::vec3 at = i < small ? point() : glm::vec3(0);
-    for (int corner = 0; corner < 3; ++corner)
-      mesh.positions.push_back(i < small ? 0.95F * at + 0.05F * point() : point());
-    mesh.faces.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
-  }
-  return mesh;
-}
+using test::room;
 
 struct Input {
   explicit Input(const scene::Mesh& given) : mesh(given), boxes(mesh.faces.size()) {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -316,18 +315,7 @@ TEST(TreeBuild, CellsOfAllAreThoseOfFragmentsWhereThatPays) {
     return test::build(mesh.view(),
                        {.references = References::all, .budget = budget, .measure_quality = true});
   };
-  scene::Mesh uneven = scene::soup(5000, 2);  // and ten triangles through all of it
-  std::minstd_rand numbers(3);
-  const auto number = [&numbers] { return static_cast<float>(numbers() % 1024) / 1024.0F; };
-  for (std::uint32_t i = 0; i < 10; ++i) {
-    const auto first = static_cast<std::uint32_t>(uneven.positions.size());
-    for (int corner = 0; corner < 3; ++corner) {
-      const float x = number();
-      const float y = number();
-      uneven.positions.emplace_back(x, y, number());
-    }
-    uneven.faces.emplace_back(first, first + 1, first + 2);
-  }
+  const scene::Mesh uneven = test::room(5000, 10);
   const Tree of_triangles = build_all(uneven, 1.0F);
   const Tree of_fragments = build_all(uneven, 1.3F);
   EXPECT_TRUE(of_fragments.statistics().skip(Skip::splitting).considered);

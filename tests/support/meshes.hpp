@@ -5,7 +5,9 @@
 #pragma once
 
 #include <cctype>
+#include <cstdint>
 #include <ostream>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,25 @@ using scene::NamedMesh;
 using scene::nested_shells;
 using scene::small_mesh;
 using scene::small_mesh_kinds;
+
+/// `small` triangles of a twentieth of the unit cube, and `large` through all of it.
+inline scene::Mesh room(std::uint32_t small, std::uint32_t large) {
+  scene::Mesh mesh;
+  std::minstd_rand numbers(3);
+  const auto number = [&numbers] { return static_cast<float>(numbers() % 1024) / 1024.0F; };
+  const auto point = [&number] {
+    const float x = number();
+    const float y = number();
+    return glm::vec3(x, y, number());
+  };
+  for (std::uint32_t i = 0; i < small + large; ++i) {
+    const glm::vec3 at = i < small ? point() : glm::vec3(0);
+    for (int corner = 0; corner < 3; ++corner)
+      mesh.positions.push_back(i < small ? 0.95F * at + 0.05F * point() : point());
+    mesh.faces.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  return mesh;
+}
 
 /// A kind of small mesh as a GoogleTest parameter: its name is the name of the case.
 struct MeshKind {
