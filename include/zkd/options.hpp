@@ -138,9 +138,9 @@ struct BuildOptions {
   /// 1024, or 0: 4, with `all` 12. With `all` a leaf that lists more than eight times as many is
   /// split again, by what lies in its cell, into trunks of twice as many, unless the boxes of what
   /// lies there are nearly the same. Of 1, 2, 4 and 8, 4 was
-  /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; as wide trees,
-  /// `all` with 8, 12 and 16 was traced alike, as binary ones with 12 at 0.87 to 0.99 of the speed
-  /// of 8 (five scenes). Time of the trunk stage grows with it.
+  /// within 3 % of the best for build plus trace on Bunny and the best on Sibenik; as a wide tree,
+  /// none of 8, 12 and 16 was ahead in most scenes for `all`, as a binary one 12 had 0.81 to 1.02
+  /// of the speed of 8 (five scenes). Time of the trunk stage grows with it.
   std::uint32_t leaf_size = 0;
 
   /// Bits of a Morton code, 1 to 64, or 0: 32 below 2^22 valid triangles, 64 from there on. With 32

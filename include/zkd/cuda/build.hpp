@@ -57,9 +57,10 @@ ZKD_API void rebuild(const cuda::Executor& executor, cuda::Tree& tree,
 
 /// What only the scene decides, as fixed options to build with, again and again: reference_capacity
 /// for `all`, exactly what these triangles need. Builds all but the references, waits, and gives
-/// its memory back. Triangles that move may need more: leave a margin, and a wider one where the scene
-/// may become uneven enough, or no longer, for `all` to make its cells from fragments (Skip::splitting
-/// says which it was). For Builder::wu2011 there is nothing to find: it returns at once.
+/// its memory back. Triangles that move may need more: leave a margin, and a wider one where the
+/// scene may become uneven enough, or no longer, for `all` to make its cells from fragments
+/// (Skip::splitting says which it was). For Builder::wu2011 there is nothing to find: it returns at
+/// once.
 ///
 /// Throws Error as build() and cuda::Tree::check().
 [[nodiscard]] ZKD_API BuildOptions analyse(const cuda::Executor& executor,
